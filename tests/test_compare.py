@@ -136,8 +136,8 @@ def test_the_head_holds_best_against_best_and_names_each_case(pair: Comparison) 
     head = cards(pair.designs, divided=True)
     labels = [card.label for card in head]
     assert labels == ["best peak of a", "best peak of b", f"peak of a at {KEY} = 50", f"peak of b at {KEY} = 50"]
-    assert f"for {KEY} = 5;" in head[0].note
-    assert f"for {KEY} = 20;" in head[1].note
+    assert f"with {KEY} = 5;" in head[0].note
+    assert f"with {KEY} = 20;" in head[1].note
     assert head[1].note.endswith(" than best peak of a")
     assert head[3].note.endswith(f"; 20 % more than peak of a at {KEY} = 50")
     alike = ss.compare(design((50, 5), 1.0, 0.6), design((50, 5), 1.2, 0.4), names=("a", "b"))

@@ -132,9 +132,9 @@ def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
     assert grows in capsys.readouterr().err
     assert result.conclusion == "1 warning, see the verdicts. Every answer is trusted."
     page = report_html(result.data)
-    assert '<div class="box some"><b>1 warning, see the verdicts.' in page
+    assert '<details class="box some"><summary>1 warning, see the verdicts.' in page
     assert '<b class="warning">WARNING:</b>' in page
-    assert '<div class="card danger">' in page
+    assert '<p class="answer danger">' in page
     data = result.data["flutter"].isel(case=0)
     w, m = int(data["least_wave"]), int(data["least_mode"])
     assert float(data["damping"][w, m]) == float(data["damping"].min()) < 0

@@ -53,17 +53,17 @@ def test_the_peak_is_of_the_largest_blade_of_each_case() -> None:
     peaks = [view.peak_response(c) * view.scale.factor for c in view.cases]
     assert drawn == pytest.approx(peaks, rel=1e-12)
     assert "tip.x of the blade that is largest at the peak of each case" in plot.caption
-    assert "Hz (tip[2].x) for load.shaker.ratio = 5" in plot.caption
+    assert "Hz (tip[2].x) with load.shaker.ratio = 5" in plot.caption
 
 
 def test_a_tile_tells_amplification_and_largest_blade() -> None:
     shown = cards(Response(wheel()))
     (tile,) = (c for c in shown if "amplification" in c.label)
     assert tile.value == "1.5"
-    assert tile.note.startswith("largest: blade 2 for load.shaker.ratio = 5; smallest of 2 cases 1.25, blade 0")
+    assert tile.note.startswith("largest: blade 2 with load.shaker.ratio = 5; smallest of 2 cases 1.25, blade 0")
     (shift,) = (c for c in shown if "shift of the peak" in c.label)
-    assert "Hz (tip[0].x) for" in shift.note
-    assert "Hz (tip[2].x) for" in shift.note
+    assert "Hz (tip[0].x) with" in shift.note
+    assert "Hz (tip[2].x) with" in shift.note
 
 
 def test_a_blade_that_is_named_stays_the_one_of_the_peak() -> None:

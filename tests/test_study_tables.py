@@ -210,7 +210,7 @@ def test_the_examples_are_short_and_good(name, most):
 def test_the_two_blades_have_nine_cases_and_share_their_parts():
     study = read_study(EXAMPLES / "two_blades" / "study.toml")
     labels = [case.label for case in study.cases()]
-    assert labels[0] == "load.shaker.ratio = 250"
+    assert labels[0] == "ratio 250"
     assert len(labels) == 9
     assert len({case.digest for case in study.cases()}) == 9
 
@@ -593,14 +593,49 @@ def test_lists_of_one_table_run_together_and_several_tables_multiply(tmp_path):
     path.write_text(text, encoding="utf-8")
     cases = read_study(path).cases()
     assert [case.label for case in cases] == [
-        "load.shaker.force_n = 1, contact.brake.slip_limit_n = 3, forced_response.direction = up",
-        "load.shaker.force_n = 1, contact.brake.slip_limit_n = 3, forced_response.direction = down",
-        "load.shaker.force_n = 2, contact.brake.slip_limit_n = 4, forced_response.direction = up",
-        "load.shaker.force_n = 2, contact.brake.slip_limit_n = 4, forced_response.direction = down",
+        "force 1 N, direction up",  # the slip limit runs with the force, which tells the cases apart
+        "force 1 N, direction down",
+        "force 2 N, direction up",
+        "force 2 N, direction down",
     ]
     assert cases[3].settings.contact["brake"].slip_limit_n == 4.0
     assert cases[3].settings.forced_response.direction == "down"
     assert cases[0].digest == cases[1].digest != cases[2].digest
+
+
+def labels_of(tmp_path, *lines):
+    path = write_four_masses(tmp_path)
+    path.write_text("\n".join([path.read_text(encoding="utf-8"), *lines]), encoding="utf-8")
+    return [case.label for case in read_study(path).cases()]
+
+
+def test_names_of_cases_may_be_given(tmp_path):
+    together = ["[[vary]]", "load.shaker.force_n = [1.0, 2.0]", "contact.brake.slip_limit_n = [3.0, 3.0]"]
+    names = 'name = ["light", "heavy"]'
+    assert labels_of(tmp_path, *together, names) == ["light", "heavy"]
+    more = ["[[vary]]", 'forced_response.direction = ["up", "down"]']
+    assert labels_of(tmp_path, *together, names, *more)[:2] == ["light, direction up", "light, direction down"]
+
+
+def test_names_of_cases_are_the_shortest_that_tell_them_apart(tmp_path):
+    doubled = ["[[vary]]", "load.shaker.force_n = [1.0, 1.0]", "contact.brake.slip_limit_n = [3.0, 4.0]"]
+    assert labels_of(tmp_path, *doubled) == ["slip limit 3 N", "slip limit 4 N"]
+    twice = ["[[vary]]", "contact.brake.slip_limit_n = [3.0]", "[[vary]]", "contact.link.slip_limit_n = [1.0, 2.0]"]
+    assert labels_of(tmp_path, *twice)[1] == "brake slip limit 3 N, link slip limit 2 N"
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ('"light"', "vary.name: must be a list of texts, got 'light'"),
+        ('["light", 2]', "vary.name: must be a list of texts"),
+        ('["light"]', "vary.name: has 1 for 2 cases"),
+        ('["light", "light"]', "vary: has several cases called 'light'"),
+    ],
+)
+def test_names_of_cases_that_do_not_fit_are_refused(tmp_path, names, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        labels_of(tmp_path, "[[vary]]", "load.shaker.force_n = [1.0, 2.0]", f"name = {names}")
 
 
 def test_a_key_may_be_varied_that_the_file_leaves_out(tmp_path):

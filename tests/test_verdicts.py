@@ -168,16 +168,19 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     ]
     assert in_lines(given, every=True) == [str(v) for v in worst_first(given)]
     page = concluded(given, "", bad=True)
-    assert [(t.verdict.case, t.likewise) for t in page.shown] == [
-        ("k = 2", "Likewise: k = 4 (12.5 Hz)."),
-        ("k = 5", ""),
-        ("k = 6", ""),
-        ("k = 4", ""),
+    assert [(t.verdict.case, t.likewise, [v.case for v in t.others]) for t in page.causes] == [
+        ("k = 2", "Likewise: k = 4 (12.5 Hz).", ["k = 4"]),
+        ("k = 5", "", []),
+        ("k = 6", "", []),
     ]
-    assert [t.verdict.case for t in page.good] == ["k = 1", "k = 3"]
+    assert page.counts == "4 doubtful"
+    assert [v.case for v in page.good] == ["k = 1", "k = 3"]
     assert page.kind == "bad"
     assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
     assert together(["a = 1", "a = 2"]) == "a = 1, 2"
+    assert together(["force 3 N", "force 5 N", "force 7 N"]) == "force 3 N, 5 N, 7 N"
+    assert together(["10 g", "20 g"]) == "10 g, 20 g"
+    assert together(["friction coefficient 0.4"]) == "friction coefficient 0.4"
     assert together(["a = 1", "b = 1"]) == "a = 1, b = 1"
     assert together(["a = 1", "a = 1, b = 3"]) == "a = 1, a = 1, b = 3"
     assert together(["a = 1"]) == "a = 1"
@@ -650,12 +653,12 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
     assert said.rstrip().splitlines()[-1] == result.not_trusted == result.conclusion
     assert result.conclusion in page
     assert result.conclusion in repr(result)
-    assert "1 of 2 cases doubtful (load.shaker.force_n = 8)" in said
+    assert "1 of 2 cases doubtful (force 8 N)" in said
     assert result.peaks["verdict"].tolist() == ["trusted", "doubtful"]
     assert math.isclose(result.verdicts[0].frequency_hz or 0.0, float(data.peak_frequency_hz[0]))
     good = result.verdicts[0]
-    assert (good.level, good.case) == ("trusted", "load.shaker.force_n = 0.01")
-    assert str(good).startswith("TRUSTED: load.shaker.force_n = 0.01: ")
+    assert (good.level, good.case) == ("trusted", "force 0.01 N")
+    assert str(good).startswith("TRUSTED: force 0.01 N: ")
 
 
 def test_an_integration_examines_the_harmonics_of_its_point() -> None:

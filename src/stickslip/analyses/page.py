@@ -13,7 +13,7 @@ from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
 from stickslip.analyses.pictures import model
 from stickslip.errors import input_error
-from stickslip.report.cases import cases_of, varied
+from stickslip.report.cases import CASE, cases_of
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
 from stickslip.report.plot import Plot
@@ -60,11 +60,30 @@ def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
             yield shown
 
 
-def _chapter(
-    section: Section, block: Block, data: xr.Dataset, views: Sequence[Any], placing: Placing
-) -> Chapter | None:
-    """Return a chapter for all cases, or one for each case with buttons; None for an empty chapter."""
-    bodies = [placing(_contents(block.parts, view)) for view in views]
+def _answer(shown: Sequence[tuple[Section, xr.Dataset]]) -> Plot | None:
+    """Return the figure at the top of the page: that of the first section, if it is the same for all its cases."""
+    for section, data in shown[:1]:
+        first, *others = _views(section, data)
+        parts = section.answer or tuple(part for block in section.blocks for part in block.parts)
+        figures = (own for own in _contents(parts, first) if isinstance(own, Plot))
+        return None if others else next(figures, None)
+    return None
+
+
+def _cards(section: Section, data: xr.Dataset) -> list[Card]:
+    """Return the numbers of a section for the top of the page; those of one case of several name it."""
+    views = _views(section, data)
+    own = section.cards(views[0])
+    case = str(data["case_label"].values[0]) if len(views) > 1 else ""
+    return [replace(card, note="; ".join(filter(None, (card.note, case)))) for card in own]
+
+
+def _chapter(section: Section, block: Block, data: xr.Dataset, placing: Placing, above: Plot | None) -> Chapter | None:
+    """Return a chapter for all cases, or one for each case with buttons; None for an empty one. The figure `above` is not drawn again."""
+    bodies = [
+        placing(own for own in _contents(block.parts, view) if above is None or getattr(own, "key", "") != above.key)
+        for view in _views(section, data)
+    ]
     if not any(bodies):
         return None
     if len(bodies) == 1:
@@ -72,7 +91,7 @@ def _chapter(
         same = [Words((f"The same in all {n} cases.",))] if n > 1 else []
         return Chapter(block.key, block.title, [*placing(same), *bodies[0]], folded=block.folded)
     cases = cases_of(data)
-    buttons = chooser(varied(data), cases, 0)
+    buttons = chooser(CASE, cases, 0)
     each = [CaseBody(k, case.label, body) for k, (case, body) in enumerate(zip(cases, bodies, strict=True))]
     return Chapter(block.key, block.title, placing([buttons] if buttons else []), each, block.folded)
 
@@ -119,28 +138,25 @@ def report_html(tree: xr.DataTree) -> str:
     tree
         A result: one node an analysis, provenance in the attributes of the root. Missing parts are left out.
     """
-    placing, nodes = Placing(), _nodes(tree)
+    placing, nodes, shown = Placing(), _nodes(tree), list(_shown(tree))
     root = Node(tree.to_dataset())
-    given = inputs(study_of(root), nodes)
+    above = _answer(shown)
+    figure = placing([above] if above else [])
+    cards = [card for section, data in shown for card in _cards(section, data)]
+    each = (_chapter(section, block, data, placing, above) for section, data in shown for block in section.blocks)
+    chapters = [chapter for chapter in each if chapter is not None]
+    body = placing(_contents((nonlinear_mode.over_responses,), nodes))
+    chapters += [Chapter("backbones", "Responses and modes", body)] if body else []
+    chapters = sorted(chapters, key=lambda chapter: chapter.folded)
     drawing = model.picture(nodes)
-    body = placing([*([drawing] if drawing else []), *given])
-    chapters = [Chapter("inputs", "What was computed", body)] if body else []
-    cards: list[Card] = []
-    for section, data in _shown(tree):
-        views = _views(section, data)
-        cards += section.cards(views[0])
-        own = (_chapter(section, block, data, views, placing) for block in section.blocks)
-        chapters += [chapter for chapter in own if chapter is not None]
-    for key, title, parts in (
-        ("backbones", "Responses and modes", (nonlinear_mode.over_responses,)),
-        ("model", "Model", model.PARTS),
-    ):
-        body = placing(_contents(parts, nodes))
-        chapters += [Chapter(key, title, body)] if body else []
-    chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree))))
+    given = placing([*([drawing] if drawing else []), *inputs(study_of(root), nodes)])
+    facts = placing(_contents(model.PARTS, nodes))
+    for key, title, body in (("inputs", "What was computed", given), ("model", "Model", facts)):
+        chapters += [Chapter(key, title, body, folded=True)] if body else []
+    chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree)), folded=True))
     made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
     told = concluded(of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree)))
-    return page_html(root.text("title") or "Result", made, chapters, cards=cards, conclusion=told)
+    return page_html(root.text("title") or "Result", made, chapters, cards=cards, answer=figure, conclusion=told)
 
 
 def write_report(tree: xr.DataTree, path: Path) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 
 from stickslip.report.plot import ramp
-from stickslip.report.quantities import number
-from stickslip.study.varied import as_number, first_varied_number, varied_values
+from stickslip.study.varied import assigned_of, first_varied_number, varied_values
+
+CASE = "case"  # heading of legends and columns
 
 
 @dataclass(frozen=True)
@@ -19,13 +20,15 @@ class ShownCase:
     index
         Position along ``case`` in the dataset.
     label
-        Varied keys with their values; empty for a study without [vary].
+        Name of the case; empty for a study without [vary].
     short
-        The values alone, for legends and columns.
+        The name, or the number of a case without one, for legends and columns.
     value
         Value of the first varied key whose values are numbers; NaN without one.
     excitation
         Amplitude of the harmonic force in N; NaN for none.
+    assigned
+        Varied keys with their values: ``load.shaker.force_n = 3``.
     colour
         CSS colour, from navy for the first case to gold for the last one.
     """
@@ -35,22 +38,18 @@ class ShownCase:
     short: str
     value: float
     excitation: float
+    assigned: tuple[str, ...]
     colour: str
 
     @property
     def where(self) -> str:
-        """The end of a sentence about this case: `` for key = value``, or nothing."""
-        return f" for {self.label}" if self.label else ""
+        """The end of a sentence about this case: `` with NAME``, or nothing."""
+        return f" with {self.label}" if self.label else ""
 
     @property
     def named(self) -> str:
-        """The subject of a sentence about this case: ``key = value``, or ``the response``."""
+        """The subject of a sentence about this case: its name, or ``the response``."""
         return self.label or "the response"
-
-
-def varied(data: xr.Dataset) -> str:
-    """Return the varied keys as the heading of a legend or column."""
-    return ", ".join(varied_values(data)[0]) or "case"
 
 
 def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
@@ -59,17 +58,22 @@ def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
     return key, values
 
 
-def _short(row: np.ndarray) -> str:
-    return ", ".join(number(as_number(v), 4) if np.isfinite(as_number(v)) else str(v) for v in row)
-
-
 def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
     """Return the cases of an analysis in the order of the study."""
     n = data.sizes.get("case", 1)
-    values, numbers = varied_values(data)[1], first_number(data)[1]
+    (keys, values), numbers = varied_values(data), first_number(data)[1]
+    rows = [dict(zip(keys, row, strict=True)) for row in values]
     labels = [str(v) for v in data["case_label"].values] if "case_label" in data else [""] * n
     force = np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)
     return tuple(
-        ShownCase(i, labels[i], _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
+        ShownCase(
+            i,
+            labels[i],
+            labels[i] or str(i + 1),
+            float(numbers[i]),
+            float(force[i]),
+            assigned_of(rows[i]),
+            colour,
+        )
         for i, colour in enumerate(ramp(n))
     )

@@ -2,6 +2,7 @@
 
 import re
 from base64 import b64decode, b64encode
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -28,6 +29,7 @@ _CONFIG = {
     # the camera saves pictures for print: twice the size on the screen
     "toImageButtonOptions": {"scale": 2},
 }
+PLURAL = ("note", "warning")  # words of verdicts that are counted; the others are levels
 _BOLD, _CODE = re.compile(r"\*\*(.+?)\*\*"), re.compile(r"`([^`]+)`")
 
 
@@ -66,21 +68,41 @@ class Chapter:
 
 
 @dataclass(frozen=True)
-class Told:
-    """A verdict; the first of its kind also names the places of the others."""
+class Cause:
+    """Verdicts of one kind: the first in full, and the others where they are asked for."""
 
     verdict: Verdict
-    likewise: str = ""
+    others: Sequence[Verdict] = ()
+
+    @property
+    def likewise(self) -> str:
+        """The places of the other verdicts; empty for none."""
+        return likewise(self.others)
 
 
 @dataclass(frozen=True)
 class Conclusion:
-    """Head of the page: verdicts with a doubt, a warning or a remedy, the worst first; then the trusted answers."""
+    """Head of the page: one line, and folded below it the verdicts by cause, the worst first, and the trusted answers.
+
+    Parameters
+    ----------
+    told
+        The line.
+    kind
+        Colour of the line.
+    counts
+        Numbers of doubts, warnings and notes, in words; empty for none.
+    causes
+        Verdicts with a doubt, a warning or a remedy.
+    good
+        Trusted answers with what was examined.
+    """
 
     told: str
     kind: Literal["good", "some", "bad"]
-    shown: Sequence[Told]
-    good: Sequence[Told]
+    counts: str
+    causes: Sequence[Cause]
+    good: Sequence[Verdict]
 
 
 @dataclass
@@ -142,12 +164,12 @@ def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusio
     """
     every = worst_first(verdicts)
     told_of = [v for v in every if v.told]
-    kinds = of_kinds(told_of)
-    shown = [Told(first, likewise(others)) for first, *others in kinds]
-    shown += [Told(v) for _, *others in kinds for v in others]
     warns = any(v.rank or v.warns for v in told_of)
     kind: Literal["good", "some", "bad"] = "bad" if bad else "some" if warns else "good"
-    return Conclusion(told, kind, shown, [Told(v) for v in every if not v.told])
+    words = Counter(v.word for v in told_of)
+    counts = ", ".join(f"{n} {word}{'s' * (n > 1 and word in PLURAL)}" for word, n in words.items())
+    causes = [Cause(first, others) for first, *others in of_kinds(told_of)]
+    return Conclusion(told, kind, counts, causes, [v for v in every if not v.told])
 
 
 def anchor(key: str) -> str:
@@ -182,6 +204,7 @@ def page_html(
     chapters: Sequence[Chapter],
     *,
     cards: Sequence[Card] = (),
+    answer: Sequence[Placed] = (),
     conclusion: Conclusion | None = None,
 ) -> str:
     """Return a whole page, which needs neither network nor other files.
@@ -193,7 +216,9 @@ def page_html(
     chapters
         Chapters in the order of the page.
     cards
-        Boxes at the top.
+        Numbers at the top: the answer, then those below its figure.
+    answer
+        Figure of the answer; empty for none.
     conclusion
         Verdicts above all else; None for a page without verdicts.
     """
@@ -205,6 +230,7 @@ def page_html(
             made=made,
             chapters=chapters,
             cards=cards,
+            answer=answer,
             conclusion=conclusion,
             style=_asset("page.css"),
             plotly=Markup(get_plotlyjs()),

@@ -16,7 +16,7 @@ Part = Callable[[Any], Shown]  # of a view of the dataset
 
 @dataclass(frozen=True)
 class Card:
-    """A box at the top of the page: a number, its name and a remark; red for danger."""
+    """A number at the top of the page, its name and a remark; red for danger. The first one of a page is its answer."""
 
     value: str
     label: str
@@ -67,7 +67,9 @@ class Section:
     by_case
         Whether `view` takes one case at a time; the blocks are then drawn once a case.
     cards
-        Boxes for the top of the page.
+        Numbers for the top of the page, the answer first.
+    answer
+        Parts that draw the answer: the first figure among them stands at the top of the page. Empty: the first figure of the section.
     """
 
     name: str
@@ -76,3 +78,4 @@ class Section:
     blocks: tuple[Block, ...]
     by_case: bool = False
     cards: Callable[[Any], Sequence[Card]] = _nothing
+    answer: tuple[Part, ...] = ()

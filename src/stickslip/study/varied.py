@@ -1,9 +1,12 @@
 """The varied keys of a study, from the dataset of an analysis."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray
+from stickslip.study.file.case_names import assignments
 
 
 def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
@@ -35,12 +38,12 @@ def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
 
 
 def other_values(data: xr.Dataset, key: str) -> list[str]:
-    """Return the other varied keys of each case with their values, as in labels of cases; empty if there are none."""
+    """Return the other varied keys of each case with their values; empty if there are none."""
     keys, values = varied_values(data)
-    others = [i for i, k in enumerate(keys) if k != key]
-    return [", ".join(f"{keys[i]} = {_written(row[i])}" for i in others) for row in values]
+    rows = [{k: v for k, v in zip(keys, row, strict=True) if k != key} for row in values]
+    return [", ".join(assigned_of(row)) for row in rows]
 
 
-def _written(value: object) -> str:
-    number = as_number(value)
-    return str(value) if np.isnan(number) else f"{number:g}"
+def assigned_of(values: Mapping[str, object]) -> tuple[str, ...]:
+    """Return the varied keys of a case with their values, which a dataset holds as texts."""
+    return assignments({k: str(v) if np.isnan(as_number(v)) else as_number(v) for k, v in values.items()})

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import takewhile
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -124,12 +125,13 @@ def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
 
 
 def together(labels: Sequence[str]) -> str:
-    """Join labels of cases to one line; a common key is named once."""
-    keys = {label.partition(" = ")[0] for label in labels}
-    if len(keys) == 1 and not any(", " in label for label in labels):
-        head, *rest = labels
-        return ", ".join([head, *(label.partition(" = ")[2] or label for label in rest)])
-    return ", ".join(labels)
+    """Join names of cases to one line; the words that all begin with are written once."""
+    words = zip(*(label.split(" ")[:-1] for label in labels), strict=False)
+    common = [own[0] for own in takewhile(lambda own: len(set(own)) == 1, words)]
+    if not common or any(", " in label for label in labels):
+        return ", ".join(labels)
+    head, *rest = labels
+    return ", ".join([head, *(label.removeprefix(f"{' '.join(common)} ") for label in rest)])
 
 
 def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:

@@ -60,7 +60,7 @@ def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
         c.label for d in designs if d.response and len(d.response.cases) > 1 for c in d.response.cases
     )
     names = [_BEST, *labels] if labels else []
-    return tuple(ShownCase(i, name, name, float("nan"), float("nan"), MUTED) for i, name in enumerate(names))
+    return tuple(ShownCase(i, name, name, float("nan"), float("nan"), (), MUTED) for i, name in enumerate(names))
 
 
 def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | None:

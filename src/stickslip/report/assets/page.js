@@ -9,7 +9,7 @@ document.querySelectorAll(".chooser button").forEach(button => button.addEventLi
   });
 }));
 // on a narrow screen a legend beside the panel would leave it half the width
-if (innerWidth < 600) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
+if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
   const legend = plot.layout.legend || {};
   if (plot.closest(".panels") || !(legend.x > 1)) return;
   Plotly.relayout(plot, {"legend.orientation": "h", "legend.x": 0, "legend.y": -0.16, "legend.yanchor": "top"});

@@ -11,7 +11,7 @@ from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import told
 from stickslip.study.file.tables import VERSION, Tables, study_tables
 from stickslip.study.file.toml import read_toml
-from stickslip.study.file.vary import cases_of, label_of, with_values
+from stickslip.study.file.vary import VariedCase, cases_of, with_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class TablesOfCase:
     Parameters
     ----------
     label
-        Varied keys with their values; empty for a study without [vary].
+        Its name, in [vary] or the shortest that tells the cases apart; empty for a study without [vary].
     values
         Varied key -> its value here.
     tables
@@ -89,9 +89,9 @@ def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
     model = study_tables()
     found: list[TablesOfCase] = []
     errors: dict[str, InputError] = {}
-    for values in cases_of(str(path), raw, model):
+    for case in cases_of(str(path), raw, model):
         try:
-            found.append(_case(path, raw, values))
+            found.append(_case(path, raw, case))
         except InputError as error:  # what is wrong in many cases is told once
             errors |= {str(one): one for one in error.each()}
     if errors:
@@ -99,14 +99,14 @@ def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
     return tuple(found)
 
 
-def _case(path: Path, raw: Mapping[str, Any], values: Mapping[str, Any]) -> TablesOfCase:
+def _case(path: Path, raw: Mapping[str, Any], case: VariedCase) -> TablesOfCase:
     model = study_tables()
     try:
-        tables = model.model_validate(with_values(raw, values), context={"study": path})
+        tables = model.model_validate(with_values(raw, case.values), context={"study": path})
     except ValidationError as error:
-        renamed = {key: f"vary.{key}" for key in values}
+        renamed = {key: f"vary.{key}" for key in case.values}
         raise told(str(path), model, error, renamed) from None
-    return TablesOfCase(label_of(values), values, tables)
+    return TablesOfCase(case.name, case.values, tables)
 
 
 def _check_version(path: Path, found: object) -> None:

@@ -86,6 +86,12 @@ def unit_of(ending: str) -> Unit | None:
     return Unit(f"{' '.join(above) or '1'}{over}", size, powers)
 
 
+def split_units(key: str) -> tuple[str, str]:
+    """Return the name in a key and the symbol of its unit: ``force_n`` -> ``force``, ``N``."""
+    name, unit = next(_split(key))
+    return name, unit.symbol
+
+
 def _split(key: str) -> Iterator[tuple[str, Unit]]:
     """Yield the possible splits of a key into name and unit, the longest unit first; last without a unit."""
     words = key.split("_")

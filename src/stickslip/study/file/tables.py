@@ -97,7 +97,7 @@ class Tables(Section):
     vary: Any = Field(
         None,
         description="the table [vary], or several [[vary]]: keys of the file and the lists of their values; the lists of one table "
-        "run together, several tables multiply",
+        "run together, several tables multiply; name = [...] names the cases of a table",
     )
 
 

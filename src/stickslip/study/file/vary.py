@@ -1,7 +1,9 @@
 """The table [vary]: any key of the file becomes a list; lists of one table run together, several tables multiply."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
+from dataclasses import dataclass
 from itertools import product
 from math import prod
 from typing import Any, get_args, get_origin
@@ -9,18 +11,29 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel
 
 from stickslip.errors import InputError, input_error, together
+from stickslip.study.file.case_names import JOINT, short_name, short_names
 from stickslip.study.file.messages import alternatives, plain, whole
 from stickslip.study.file.section import shown
 from stickslip.study.file.suffixes import nearest_key
 
 MOST_CASES = 1000
+NAME = "name"  # the key of [vary] that names its cases
+NAMED = 'For example name = ["light", "heavy"].'
 EXAMPLE = "For example [vary] with load.shaker.ratio = [100, 20]."
 
 Values = dict[str, Any]  # varied key -> value
 
 
-def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[Values]:
-    """Return the values of the varied keys in each case; one empty case for a file without [vary].
+@dataclass(frozen=True)
+class VariedCase:
+    """Name and varied values of a case; both empty for a file without [vary]."""
+
+    name: str
+    values: Values
+
+
+def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[VariedCase]:
+    """Return name and values of each case; one case for a file without [vary].
 
     Parameters
     ----------
@@ -34,26 +47,37 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     Raises
     ------
     InputError
-        If a key does not exist, is no list, or lists of one table differ in length.
+        If a key does not exist, is no list, lists of one table differ in length, or two cases have one name.
     """
     given = raw.get("vary")
     if given is None:
-        return [{}]
+        return [VariedCase("", {})]
     tables = given if isinstance(given, list) else [given]
     if not all(isinstance(table, dict) for table in tables):
         raise input_error(f"{place}: vary", f"must be a table, got {shown(given)}", EXAMPLE)
     errors: list[InputError] = []
-    flat = [dict(_flat(place, table, errors)) for table in tables]
+    flat = [dict(_flat(place, {k: v for k, v in table.items() if k != NAME}, errors)) for table in tables]
     errors += _wrong(place, flat, raw, model)
+    errors += [error for table, lists in zip(tables, flat, strict=True) for error in _wrong_names(place, table, lists)]
     if errors:
         raise together(errors)
     count = prod(len(next(iter(lists.values()))) for lists in flat if lists)
     if count > MOST_CASES:
         raise input_error(f"{place}: vary", f"spans {count} cases, more than {MOST_CASES}", "Vary fewer values.")
-    runs = [
-        [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)] for lists in flat if lists
+    kept = [(table.get(NAME), lists) for table, lists in zip(tables, flat, strict=True) if lists]
+    runs = [[dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)] for _, lists in kept]
+    words = short_names([rows for (names, _), rows in zip(kept, runs, strict=True) if names is None])
+    told = [names or [short_name(row, words) for row in rows] for (names, _), rows in zip(kept, runs, strict=True)]
+    found = [
+        VariedCase(JOINT.join(own), {k: v for part in parts for k, v in part.items()})
+        for own, parts in zip(product(*told), product(*runs), strict=True)
     ]
-    return [{k: v for part in parts for k, v in part.items()} for parts in product(*runs)]
+    doubled = [name for name, n in Counter(case.name for case in found).items() if n > 1]
+    if doubled:
+        raise input_error(
+            f"{place}: vary", f"has several cases called {doubled[0]!r}", "Give each value, or name, once."
+        )
+    return found
 
 
 def with_values(raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False) -> dict[str, Any]:
@@ -78,7 +102,7 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
     """
     given = raw.get("vary", {})
     tables = given if isinstance(given, list) else [given]
-    varied = {key: found for table in tables for key, found in _flat(place, table, [])}
+    varied = {key: found for table in tables for key, found in _flat(place, table, []) if key != NAME}
     errors = [
         input_error(
             f"{place}: {key}",
@@ -90,15 +114,6 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
     ]
     if errors:
         raise together(errors)
-
-
-def label_of(values: Mapping[str, Any]) -> str:
-    """Return the label of a case: ``load.shaker.ratio = 250``."""
-    return ", ".join(f"{key} = {_text(value)}" for key, value in values.items())
-
-
-def _text(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _flat(
@@ -117,6 +132,16 @@ def _flat(
         else:
             problem = f"must be a list of values, got {shown(value)}"
             errors.append(input_error(f"{place}: vary.{key}", problem, EXAMPLE))
+
+
+def _wrong_names(place: str, table: Mapping[str, Any], lists: Mapping[str, Sequence[Any]]) -> Iterator[InputError]:
+    """Yield what is wrong with the names of a table's cases."""
+    names, count = table.get(NAME, []), len(next(iter(lists.values()), ()))
+    if NAME in table and not (isinstance(names, list) and all(isinstance(n, str) and n.strip() for n in names)):
+        yield input_error(f"{place}: vary.{NAME}", f"must be a list of texts, got {shown(names)}", NAMED)
+    elif NAME in table and len(names) != count:
+        told = f"has {len(names)} for {count} cases"
+        yield input_error(f"{place}: vary.{NAME}", told, f"Give one name a case of its table. {NAMED}")
 
 
 def _wrong(

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from stickslip.arrays import FloatArray
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.readers.measured_columns import LENGTHS, MeasuredColumns, read_columns
+from stickslip.study.file.case_names import assignments, written
 from stickslip.study.file.study import StudyFile, TablesOfCase
 from stickslip.study.file.tables import study_tables
 from stickslip.study.file.vary import with_values
@@ -221,10 +222,10 @@ def _column(columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str
 
 
 def _others(columns: MeasuredColumns, keys: Sequence[str], cases: Sequence[TablesOfCase]) -> tuple[str, ...]:
-    """Return the other varied keys in the file with their values, as in labels of cases."""
+    """Return the other varied keys in the file with their values."""
     told: list[list[str]] = [[] for _ in columns.rows]
     for key in (k for k in keys if k.lower() in columns.names):
-        known = {_text(case.values[key]): f"{key} = {_text(case.values[key])}" for case in cases}
+        known = {written(case.values[key]): assignments({key: case.values[key]})[0] for case in cases}
         at = columns.names.index(key.lower())
         for i, row in enumerate(columns.rows):
             label = known.get(_plain(row[at]))
@@ -232,10 +233,6 @@ def _others(columns: MeasuredColumns, keys: Sequence[str], cases: Sequence[Table
                 raise columns.wrong(i, key.lower(), "is none of the values of [vary]", f"Known: {', '.join(known)}.")
             told[i].append(label)
     return tuple(", ".join(labels) for labels in told)
-
-
-def _text(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _plain(text: str) -> str:
@@ -273,7 +270,9 @@ def _with_forces(
     force = found.excitation.copy()
     untold = [k for k in others if k.lower() not in columns.names]
     for i in map(int, np.flatnonzero(np.isnan(force))):
-        of_case = [c for c in file.cases if set(filter(None, found.others[i].split(", "))) <= set(c.label.split(", "))]
+        of_case = [
+            c for c in file.cases if set(filter(None, found.others[i].split(", "))) <= set(assignments(c.values))
+        ]
         try:
             forces = {_force(file, {**c.values, found.key: float(found.values[i])}) for c in of_case}
         except ValidationError:

@@ -7,7 +7,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase
+from stickslip.report.cases import CASE, ShownCase
 from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
 
@@ -168,7 +168,7 @@ def energy(response: Response) -> Plot | None:
     titles = ("at the peak, by contact point", "all contacts, against frequency")
     figure = make_subplots(1, 2, horizontal_spacing=0.12, subplot_titles=titles)
     _energy_traces(figure, response, values * bars.factor, total * sums.factor)
-    styled(figure, 400, legend_title=response.varied)
+    styled(figure, 400, legend_title=CASE)
     figure.update_yaxes(title_text=f"energy ({bars.unit})", rangemode="tozero", col=1)
     drawn = total[np.isfinite(total) & (total > 0)] * sums.factor
     if drawn.size:

@@ -1,4 +1,4 @@
-"""Forced responses on the page: boxes at its head, the table of cases, and the order of all figures and tables."""
+"""Forced responses on the page: the numbers at its head, the table of cases, and the order of all figures and tables."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from stickslip.analyses.forced_response.page.wheel import (
 )
 from stickslip.analyses.forced_response.records.columns import CaseNumbers
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase
+from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.content import Table
 from stickslip.report.quantities import (
     NONE,
@@ -43,51 +43,64 @@ from stickslip.report.quantities import (
     fixed,
     number,
     percent,
-    predicted,
     quantity,
-    scale_for,
 )
 from stickslip.report.section import Block, Card, Section
-from stickslip.study.verdict import LEVELS, POINT_LEVELS
+from stickslip.study.verdict import LEVELS
 
 
-def _peak_card(response: Response) -> Card:
+def _answer(response: Response) -> Card:
+    """Return the answer: the peak, of several cases the smallest one of the best verdict, and what to do next."""
     cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
     if not cases:
-        return Card(NONE, "peak", "no case has its peak yet")
+        return Card(NONE, "peak", "No case has its peak yet.")
     within = [c for c in cases if response.resonates(c)]
-    peaks = np.array([response.peak_response(c) for c in within or cases])
-    least = min((response.trust(c) for c in within or cases), default=0)
-    counts = np.array([response.trust(c) == least for c in within or cases])
-    best = int(np.argmin(np.where(counts, peaks, np.inf)))
-    scale = scale_for(peaks[best : best + 1], response.unit)
-    size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
-    no_resonance = "the largest amplitude stands at the end of the sweep: no resonance"
+    counted_in = within or cases
+    peaks = {c: response.peak_response(c) for c in counted_in}
+    least = min(response.trust(c) for c in counted_in)
+    trusted = [c for c in counted_in if response.trust(c) == least]
+    best = min(trusted, key=lambda c: peaks[c])
+    ratio, told = (f"{amplitude(peaks[best], response.unit)}, " if response.per_force else ""), []
     if len(cases) == 1:
-        more = _whole(response, cases[0]) if response.per_force else ""
-        at = f"{response.peak_is(cases[0])}, at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
-        return Card(size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}")
+        label = f"peak of {response.output_name}{best.where}"
+        told.append(f"{ratio}{response.peak_is(best)}")
+    else:
+        which = f"{len(trusted)} {LEVELS[least]} of " * (len(trusted) < len(counted_in))
+        kind = "peak per newton" if response.per_force else "peak"
+        label = f"with {best.label}, the smallest {kind} of {which}{counted(len(counted_in), 'case')}"
+        share = peaks[best] / max(peaks.values())
+        told.append(f"{ratio}{percent(100 * float(share))} of the largest, {response.peak_is(best)}")
     if not within:
-        return Card(size, cases[best].label, f"in every case {no_resonance}")
-    left_out = len(cases) - len(within)
-    blade = response.blade_at_peak(within[best])
-    kind = counted(int(counts.sum()), "case")
-    if not counts.all():
-        kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
-    note = f"{response.peak_is(within[best])}, {response.output_name}{within[best].where}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz{_whole(response, within[best]) if response.per_force else ''}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
-    if within[best] in (response.cases[0], response.cases[-1]):
-        note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
-    lower = int(np.argmin(peaks))
+        told.append("The largest amplitude stands at the end of the sweep: no resonance")
+    elif len(within) < len(cases):
+        told.append(f"In {counted(len(cases) - len(within), 'other')} the largest stands at the end of the sweep")
+    lower = min(counted_in, key=lambda c: peaks[c])
     if peaks[lower] < peaks[best]:
-        note += f"; {number(float(peaks[lower]) * scale.factor)} {scale.unit} is {response.level(within[lower])}{within[lower].where}"
-    if left_out:
-        note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
-    return Card(size, f"smallest peak of {kind}", note)
+        told.append(f"{_size(response, lower)} is {response.level(lower)}{lower.where}")
+    value = f"{_size(response, best)} at {response.place(best)}{response.blade_at_peak(best)}"
+    return Card(value, label, ". ".join([*told, *_next(response, best)]) + ".")
 
 
-def _whole(response: Response, case: ShownCase) -> str:
-    """Return the absolute peak of a case whose response is divided by the force, as on the terminal."""
-    return f", {amplitude(response.peak_response(case) * case.excitation, response.length)}"
+def _size(response: Response, case: ShownCase) -> str:
+    """Return the peak of a case as an amplitude, also where the response is divided by the force."""
+    return amplitude(response.peak_response(case) * (case.excitation if response.per_force else 1.0), response.length)
+
+
+def _next(response: Response, best: ShownCase) -> list[str]:
+    """Return what to do next: settle a doubt, sweep farther, compute beyond the last value, or between the neighbours."""
+    if response.trust(best):
+        return [f"Next: settle why it is {response.level(best)}, see above"]
+    if not response.resonates(best):
+        return ["Next: sweep over a wider range"]
+    key = first_number(response.data)[0]
+    if not key:
+        return [] if len(response.cases) > 1 else ["Next: vary the load or the damper with [vary]"]
+    own = {text for text in best.assigned if not text.startswith(f"{key} = ")}
+    family = sorted((c for c in response.peaked if own <= set(c.assigned)), key=lambda c: c.value)
+    at = family.index(best)
+    if at in (0, len(family) - 1):
+        return [f"Next: compute beyond {best.label}, a smaller one may lie there"] if len(family) > 1 else []
+    return [f"Next: refine between {family[at - 1].label} and {family[at + 1].label}"]
 
 
 def _shift_card(response: Response) -> Card | None:
@@ -98,7 +111,7 @@ def _shift_card(response: Response) -> Card | None:
     a, b = response.peak_hz(first), response.peak_hz(last)
     blades = [response.blade_at_peak(c) for c in (first, last)]
     note = f"from {number(a, 5)} Hz{blades[0]}{first.where} to {number(b, 5)} Hz{blades[1]}{last.where}"
-    label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
+    label = f"shift of the peak ({percent(100 * (b / a - 1))})"
     return Card(f"{number(b - a)} Hz", label, note)
 
 
@@ -109,8 +122,8 @@ def _damping_card(response: Response) -> Card | None:
     shown = next((c for c in known if c.index == response.chosen), None)
     if shown is None:
         return None
-    note = f"equivalent damping ratio {percent(100 * known[shown])}{shown.where}"
-    if response.level(shown):
+    note = f"damping ratio {percent(100 * known[shown])}{shown.where}"
+    if response.trust(shown):
         note += f", {response.level(shown)}"
     if len(known) > 1:
         ends = [percent(100 * z) for z in (min(known.values()), max(known.values()))]
@@ -142,70 +155,16 @@ def _loss_card(response: Response) -> Card | None:
     return Card(lost, "lost in a cycle at the peak", f"by all contacts{response.of_sector} together")
 
 
-def _alert_cards(response: Response) -> list[Card]:
-    """Return how often more harmonics were requested, and the error with few."""
-    asked = response.alert
-    if not asked.error.size:
-        return []
-    above, at = int(np.sum(asked.error > response.threshold)), int(np.argmax(asked.error))
-    share = f"{number(100 * above / asked.error.size, 2)} %"
-    note = f"{above} of {counted(asked.error.size, 'checked point')} above {percent(response.threshold)}"
-    where = f"at {number(float(asked.hz[at]), 5)} Hz{response.cases[asked.case[at]].where}"
-    worst = predicted(float(asked.error[at]))
-    return [
-        Card(share, "of points asked for more harmonics", note),
-        Card(worst, f"worst predicted error with H = {response.low_name}", where),
-    ]
-
-
-def _work_cards(response: Response) -> list[Card]:
-    """Return how often more harmonics were kept, if a strategy chose, and their cost."""
-    n, found = int(response.converged.sum()), []
-    if response.decides:
-        more = int(np.sum(response.more & response.converged))
-        note = f"{more} of {counted(n, 'accepted point')}, chosen by {response.selection}"
-        label = f"of points keep other harmonics than H = {response.low_name}"
-        found = [Card(f"{number(100 * more / n, 2)} %" if n else NONE, label, note)]
-    work = sum(own.unknowns_solved for own in response.numbers_of)
-    if work > 0:
-        steps = sum(own.newton_steps for own in response.numbers_of)
-        note = f"of all solutions together, in {counted(steps, 'Newton step')}"
-        found.append(Card(number(work, 6), "unknowns solved", note))
-    return found
-
-
-def _verdict_card(response: Response) -> Card | None:
-    """Return the number of trusted cases, or the verdict on a single case, and the number of points that are not trusted."""
-    levels = [response.level(c) for c in response.cases]
-    if not levels[0]:
-        return None
-    points = {level: int(np.sum(response.levels == k)) for k, level in enumerate(POINT_LEVELS) if k}
-    off = [f"{n} {level}" for level, n in points.items() if n]
-    note = f"of {counted(response.levels.size, 'point')} {', '.join(off) or 'none is doubtful'}"
-    if len(levels) == 1:
-        return Card(levels[0], "verdict on the case", note)
-    cases = {level: levels.count(level) for level in LEVELS[1:]}
-    others = [f"{n} {level}" for level, n in cases.items() if n]
-    return Card(
-        f"{levels.count('trusted')} of {len(levels)}",
-        "cases to be trusted",
-        "; ".join([*([", ".join(others)] if others else []), note]),
-    )
-
-
 def cards(response: Response) -> list[Card]:
-    """Return the boxes at the head of the page."""
-    first = (
-        _peak_card(response),
+    """Return the numbers at the head of the page, the answer first."""
+    found = (
+        _answer(response),
         _damping_card(response),
         _blade_card(response),
-        _verdict_card(response),
         _shift_card(response),
         _loss_card(response),
     )
-    alert = response.is_error and response.decides and not response.auto
-    rest = _alert_cards if alert else _work_cards
-    return [card for card in first if card is not None] + rest(response)
+    return [card for card in found if card is not None]
 
 
 def peaks(response: Response) -> Table:
@@ -288,7 +247,7 @@ SECTION: Section = Section(
             "Contacts at the peak",
             (chosen_case, state_map, surface_map, hysteresis_t, hysteresis_w, energy, bodies),
         ),
-        Block("cases", "Cases", (peaks,)),
+        Block("cases", "Cases", (peaks,), folded=True),
         Block(
             "checks",
             "Checks",
@@ -300,6 +259,7 @@ SECTION: Section = Section(
                 time_integration,
                 retention,
             ),
+            folded=True,
         ),
         Block(
             "harmonics",
@@ -309,4 +269,5 @@ SECTION: Section = Section(
         ),
     ),
     cards=cards,
+    answer=(optimisation, frequency_response),
 )

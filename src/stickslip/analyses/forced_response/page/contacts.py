@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.report.cases import ShownCase
+from stickslip.report.cases import CASE, ShownCase
 from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
 from stickslip.report.quantities import counted, joined, percent, quantity
@@ -26,7 +26,7 @@ _STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (
 
 def chosen_case(response: Response) -> Chooser | None:
     """Return the buttons that choose the case of the figures below."""
-    return chooser(response.varied, response.peaked, response.chosen)
+    return chooser(CASE, response.peaked, response.chosen)
 
 
 def contact_lines(response: Response) -> list[list[int]]:

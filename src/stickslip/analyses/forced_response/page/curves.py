@@ -12,7 +12,7 @@ from stickslip.analyses.forced_response.page.tractions import draw_bands
 from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
-from stickslip.report.cases import ShownCase
+from stickslip.report.cases import CASE, ShownCase
 from stickslip.report.plot import ALARM, GRID, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.verdict import POINT_LEVELS
@@ -64,7 +64,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
         mode="markers" if response.unstable[at].any() else "lines+markers",
         name=case.short if len(response.cases) > 1 else "response",
         legendgroup="cases",
-        legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
+        legendgrouptitle={"text": CASE} if len(response.cases) > 1 else None,
         line={"color": case.colour, "width": 1.6},
         marker={
             "symbol": _symbols(response)[at].tolist(),
@@ -210,7 +210,7 @@ def frequency_response(response: Response) -> Plot | None:
         figure.add_trace(_failures(response))
     x, name, unit = abscissa(response)
     marked = mark_bifurcations(figure, response, float(np.nanmean(x / response.hz)))
-    styled(figure, 540)
+    styled(figure, 500)
     buttons = _scale_buttons(logarithmic=True)
     figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
     figure.update_xaxes(title_text=f"{name} ({unit})")

@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.forced_response.page.curves import COMPARED, most
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase
+from stickslip.report.cases import CASE, ShownCase
 from stickslip.report.plot import ALARM, INK, Plot, log_ticks, ring, styled
 from stickslip.report.quantities import counted, number, percent
 
@@ -35,7 +35,7 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
             along = response.points(case)
             x, y = response.hz[along], response.of_points.own_error_percent[along]
         drawn = {"mode": "lines", "name": case.short, "line": {"color": case.colour, "width": 1.6}}
-        add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": response.varied})
+        add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": CASE})
         if case in both:
             column = 1 + named
             at = response.points(case)
@@ -164,7 +164,7 @@ def error_scatter(response: Response) -> Plot | None:
     ends = np.array([values.min() / 1.5, values.max() * 1.5])
     dotted = {"color": INK, "width": 1, "dash": "dot"}
     figure.add_scatter(x=ends, y=ends, mode="lines", name="real = predicted", line=dotted)
-    styled(figure, 520, legend_title=response.varied if len(response.cases) > 1 else "")
+    styled(figure, 520, legend_title=CASE if len(response.cases) > 1 else "")
     dash = {"dash": "dash", "color": ALARM, "width": 1.2}
     figure.add_hline(y=response.threshold, line=dash)
     figure.add_vline(x=response.threshold, line=dash)

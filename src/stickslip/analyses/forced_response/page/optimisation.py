@@ -61,7 +61,7 @@ class Measured:
         of_amplitude = (self.amplitude * scale.factor, self.amplitude_error * scale.factor)
         for k, name in enumerate(dict.fromkeys(self.others)):
             at = np.array([other == name for other in self.others])
-            for column, unit, (y, error) in ((1, scale.unit, of_amplitude), (2, "Hz", (self.hz, self.hz_error))):
+            for row, unit, (y, error) in ((1, scale.unit, of_amplitude), (2, "Hz", (self.hz, self.hz_error))):
                 barred = np.isfinite(error)
                 for own in (at & np.isfinite(y) & barred, at & np.isfinite(y) & ~barred):
                     if own.any():
@@ -70,7 +70,7 @@ class Measured:
                         told = any(t.legendgroup == f"measured{k}" for t in figure.data)
                         points.update(name=label, legendgroup=f"measured{k}", showlegend=not told)
                         points.marker.symbol = _SYMBOLS[k % len(_SYMBOLS)]
-                        figure.add_trace(points, row=1, col=column)
+                        figure.add_trace(points, row=row, col=1)
 
     def _points(self, own: BoolArray, y: FloatArray, error: FloatArray, unit: str) -> go.Scatter:
         """Return a trace of points, either all with error bars or all without."""
@@ -169,7 +169,7 @@ def _per_page(response: Response, values: FloatArray) -> FloatArray:
 
 def _agrees(others: str, case: ShownCase) -> bool:
     """Return whether a case has the other varied values of a point."""
-    return not others or set(others.split(", ")) <= set(case.label.split(", "))
+    return not others or set(others.split(", ")) <= set(case.assigned)
 
 
 def where_friction_works(response: Response) -> Words | None:
@@ -238,7 +238,7 @@ def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
     """Group cases by all varied keys except `key`; each group is a curve."""
     found: dict[str, list[ShownCase]] = {}
     for case in cases:
-        others = ", ".join(t for t in case.label.split(", ") if not t.startswith(f"{key} = "))
+        others = ", ".join(t for t in case.assigned if not t.startswith(f"{key} = "))
         found.setdefault(others, []).append(case)
     return found
 
@@ -253,13 +253,14 @@ def optimisation(response: Response) -> Plot | None:
         return None
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
-    figure, families = make_subplots(1, 2, horizontal_spacing=0.12), _families(cases, key)
+    figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38])
+    families = _families(cases, key)
     banded = [draw_peak_bands(figure, response, own, scale.factor) for own in families.values()]
     for name, family in families.items():
         edge = {"width": 1, "color": "white"}
         mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
         curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
-        for column, (unit, y) in enumerate(curves, 1):
+        for row, (unit, y) in enumerate(curves, 1):
             figure.add_scatter(
                 x=[c.value for c in family],
                 y=y,
@@ -267,22 +268,23 @@ def optimisation(response: Response) -> Plot | None:
                 line={"color": MUTED, "width": 1.3},
                 marker=mark,
                 name=name,
-                showlegend=column == 1 and len(families) > 1,
+                showlegend=row == 1 and len(families) > 1,
                 text=[c.named for c in family],
                 hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>",
-                row=1,
-                col=column,
+                row=row,
+                col=1,
             )
-    styled(figure, 380)
+    styled(figure, 480)
     if measured:
         measured.draw(figure, scale)
     values = np.unique([c.value for c in cases])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
     ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
-    figure.update_xaxes(title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
+    figure.update_xaxes(title_text=key, row=2)
+    figure.update_xaxes(type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
     drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
-    figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
-    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
+    figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), row=1)
+    figure.update_yaxes(title_text="peak frequency (Hz)", row=2)
     caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
     caption += next(filter(None, banded), "")
     caption += shade_working_range(figure, response, logarithmic=bool(wide))

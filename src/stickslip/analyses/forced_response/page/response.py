@@ -31,7 +31,7 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
-from stickslip.report.cases import ShownCase, cases_of, varied
+from stickslip.report.cases import CASE, ShownCase, cases_of
 from stickslip.report.content import Table
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.result import Node
@@ -60,11 +60,6 @@ class Response(Node):
     def cases(self) -> tuple[ShownCase, ...]:
         """All cases, in the order of the study."""
         return cases_of(self.data)
-
-    @property
-    def varied(self) -> str:
-        """The varied keys: heading of legends and columns."""
-        return varied(self.data)
 
     @cached_property
     def of_points(self) -> Points:
@@ -326,7 +321,7 @@ class Response(Node):
         """Return a table whose first column names the case; without this column for a single case."""
         first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
         cells = [list(row)[first:] for row in rows]
-        return Table([self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
+        return Table([CASE, *head][first:], cells, heading, told, numeric, items=items, folded=folded)
 
     def rows(self, kind: type[Kind]) -> list[tuple[ShownCase, Kind]]:
         """Return the rows of all cases, such as checks of single points, each with its case."""
@@ -361,6 +356,12 @@ class Response(Node):
     def peak_hz(self, case: ShownCase) -> float:
         """Frequency of the peak in Hz; NaN without a peak."""
         return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    def place(self, case: ShownCase) -> str:
+        """Return where the peak of a case is: its speed for a response over speed, else its frequency."""
+        speed = float(self.of_points.speed_rpm[self.peak(case)]) if self.of_points.speed_rpm.size else np.nan
+        hz = f"{number(self.peak_hz(case), 5)} Hz"
+        return f"{number(speed, 5)} rpm ({hz})" if np.isfinite(speed) else hz
 
     def resonates(self, case: ShownCase) -> bool:
         """Return whether the peak of a case lies inside its sweep; at an end of the sweep the largest amplitude is no resonance."""
