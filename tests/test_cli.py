@@ -264,9 +264,9 @@ def test_full_disk_is_told_before_anything_is_computed(tmp_path: Path, monkeypat
 def test_check_says_once_what_holds_for_all_cases(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path, {"vary.load.shaker.force_n": "[5.0, 8.0, 9.0]"})
     said = done("check", str(path)).splitlines()
-    assert said.count("load.shaker.force_n = 5") == 1
+    assert said.count("force 5 N") == 1
     assert len([line for line in said if "natural frequencies, contacts open" in line]) == 1
-    assert "the same holds for: load.shaker.force_n = 8, 9" in said
+    assert "the same holds for: force 8 N, 9 N" in said
 
 
 def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
@@ -289,7 +289,9 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     for v in found.verdicts:
         assert v.why[1:] in told  # a sentence without a frequency begins with a capital
         assert not v.told or str(v) in said
-    assert page.count("<h2>") == 8  # the checks are those of stability, which nobody has to ask for
+    assert (
+        page.count("<h2>") == 7
+    )  # the curve is above all chapters; the checks are those of stability, which nobody has to ask for
     # what is finished is not computed again, and --fresh computes it again
     assert "jobs to do: 0" in done("run", str(path), "--no-report")
     assert "jobs to do: 1" in done("run", str(path), "--no-report", "--fresh")
@@ -298,7 +300,7 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
 def test_two_blades_answer_and_can_be_read_without_this_package(tmp_path: Path) -> None:
     path = write_two_blades(tmp_path, {"vary.load.shaker.ratio": "[2000, 1000]"})
     said = done("run", str(path), "--workers", "2")
-    assert "load.shaker.ratio = 1000" in said
+    assert "ratio 1000" in said
     page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
     for key in ("response", "loops_t", "states", "motion_damper", "energy", "mesh"):
         assert f'<figure id="fig-{key}"' in page

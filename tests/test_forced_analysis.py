@@ -610,7 +610,7 @@ def test_what_a_run_would_refuse_is_refused_before_any_job(tmp_path: Path):
     pull = {"load.pull.on": '"chain.m4"', "load.pull.force_n": "3.0", "load.pull.harmonic": "0"}
     path = write_four_masses(tmp_path, pull | {"vary.load.shaker.force_n": "[1e-9]"})
     case = read_study(path).cases()[0]
-    with pytest.raises(InputError, match=r"load.shaker.force_n \(load.shaker.force_n = 1e-09\): the excitation is"):
+    with pytest.raises(InputError, match=r"load.shaker.force_n \(force 1e-09 N\): the excitation is"):
         FORCED_RESPONSE.inputs(case, case.build())
 
 
