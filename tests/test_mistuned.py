@@ -308,7 +308,7 @@ def test_what_is_no_mistuning_is_refused_with_its_key():
     nowhere = BladeMistuning(of="blad", deviations=np.zeros(5))
     refused("mistuning.a.of", "there is no part", blades={"a": nowhere})
     one_side = BladeMistuning(of="blade.cyclic_high", deviations=np.zeros(5))
-    refused("mistuning.a.of", "those of the next blade", blades={"a": one_side})
+    refused("mistuning.a.of", "belong to the next blade", blades={"a": one_side})
     gone = ContactMistuning(contact="rim", quantity="gap", values=np.zeros(5))
     refused("mistuning.a.contact", "there is no such contact", contacts={"a": gone})
     far = OwnSector(sector=5, part="blade", by=model.parts["blade"])

@@ -350,6 +350,6 @@ class RunUpKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
     modes: int
     """number of natural frequencies shown beside the response, 1 to 100; default 4"""
     rate_rpm_per_s: Sequence[float] | FloatArray | None
-    """rates in rpm a second at which the speed is swept in addition, a list: the peak of a fast run-up is as a rule lower than that of the steady motion and, in the direction of direction, later; it may be slightly above where the steady curve has a notch that a sweep passes over; left out: steady motions alone"""
+    """list of rates in rpm a second at which the speed is swept in addition. The peak of a fast run-up is as a rule lower than the steady peak, and comes later in the direction of the sweep; it may be slightly above where the steady curve has a notch that a sweep passes over; left out: steady motions alone"""
     tolerance: float
     """largest relative error of squares of natural frequencies, and of the static load, between the speeds at which the model is assembled; a smaller one takes more speeds, above 0 to 0.01; default 1e-06"""

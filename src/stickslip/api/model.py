@@ -277,7 +277,7 @@ def _method(name: str) -> Callable[..., Result]:
     def ask(self: Model, *, folder: str | Path | None = None, **keys: Any) -> Result:
         return self._answer(name, keys, folder)
 
-    ask.__name__, ask.__doc__ = name, f"Answer the question [{name}]; its keys are those of the table."
+    ask.__name__, ask.__doc__ = name, f"Answer the question [{name}]; its keys are the keys of the table."
     return ask
 
 

@@ -167,7 +167,7 @@ def _refuse_direction(places: Places, key: str, load: Load, spot: Spot) -> None:
         raise input_error(
             f"{key}.direction",
             f"is given, but {load.on!r} is a single dof, or several, of direction {', '.join(sorted(own))}",
-            "Leave it out: the force acts along the dof, and its sign is that of force_n. Or name a node that can move so.",
+            "Leave it out; the force acts along the dof with the sign of force_n. Or name a node that can move so.",
         )
 
 
@@ -400,8 +400,7 @@ def _axis_of_excitation(loads: Mapping[str, Load]) -> str | None:
 def beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
     """Return a warning about engine orders not below the number of sectors: they act as lower ones do."""
     return [
-        f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}: a force "
-        "that changes so much within a sector is taken as the same all over its place."
+        f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}; such a force varies within a sector, but is taken as constant over its place."
         for name, load in loads.items()
         if sectors > 1 and load.engine_order is not None and load.engine_order >= sectors
     ]

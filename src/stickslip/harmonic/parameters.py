@@ -151,7 +151,7 @@ def rebuilt(build: BalanceAt, first: float) -> BalanceAt:
         if not np.array_equal(made.linear.retained, reference.linear.retained):
             raise input_error(
                 "parameter",
-                f"the retained dofs at {value:g} differ from those at {first:g}",
+                f"the retained dofs differ between {value:g} and {first:g}",
                 "Keep contacts and dofs the same for all values.",
             )
         return replace(made, displacement_scale=reference.displacement_scale, force_scale=reference.force_scale)

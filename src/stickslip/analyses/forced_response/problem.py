@@ -213,7 +213,7 @@ class Question:
         if len(orders) < 2 or not base:
             return ()
         waves = [f"{m} in harmonic {h} as wave {m % self.model.sectors}" for h, m in orders.items()]
-        range_of = "speeds are those of the wheel" if self.over_speed else f"{self.key} is {base} times the speed"
+        range_of = "speeds belong to the wheel" if self.over_speed else f"{self.key} is {base} times the speed"
         return (f"engine orders: {', '.join(waves)}; {range_of}",)
 
     @property

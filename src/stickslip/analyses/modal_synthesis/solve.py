@@ -152,7 +152,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         swept = f"the highest peak that a sweep meets has {millimetres(peaks[0][0])} at {peaks[0][1] / HZ:.5g} Hz"
         answer, why = (
             "doubtful",
-            f"{swept}, that of a detached curve {millimetres(detached[0])} at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}",
+            f"{swept}; on a detached curve it is {millimetres(detached[0])} at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}",
         )
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
     beside = along(shared.others, curve, question.dof)

@@ -155,10 +155,7 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
     figure.update_xaxes(title_text=f"{name} ({unit})")
     ticks = log_ticks(scale.factor * amplitude)
     figure.update_yaxes(title_text=f"amplitude of {output} ({scale.unit})", type="log", **ticks)
-    caption = (
-        f"Amplitude of {output} in the first harmonic, all responses and the backbone of {joined(drawn)}. A peak lies on a backbone as long as its "
-        "mode alone answers the load and little damping is added; a peak beside it tells of other modes or of a load that shares the damping unequally."
-    )
+    caption = f"Amplitude of {output} in the first harmonic, all responses and the backbone of {joined(drawn)}. A peak lies on a backbone if its mode alone answers the load and little damping is added. A peak beside it shows other modes, or a load that shares the damping unequally."
     return Plot("backbones", "Backbones over the frequency responses", caption, figure)
 
 

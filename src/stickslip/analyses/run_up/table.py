@@ -32,8 +32,7 @@ class RunUpTable(Section):
         None,
         min_length=1,
         max_length=20,
-        description="rates in rpm a second at which the speed is swept in addition, a list: the peak of a fast run-up is as a rule "
-        "lower than that of the steady motion and, in the direction of direction, later; it may be slightly above where the steady curve "
+        description="list of rates in rpm a second at which the speed is swept in addition. The peak of a fast run-up is as a rule lower than the steady peak, and comes later in the direction of the sweep; it may be slightly above where the steady curve "
         "has a notch that a sweep passes over; left out: steady motions alone",
     )
     tolerance: float = Field(

@@ -130,7 +130,7 @@ def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> I
     if np.setdiff1d(leaders(sector, own), left).size:
         raise input_error(
             place,
-            f"{of!r} has dofs of the high cyclic face, which are those of the next blade, and not their partners on the low face",
+            f"{of!r} has dofs of the high cyclic face, which belong to the next blade, but not their partners on the low face",
             "Take the partners on the low face into the set, or leave the face out.",
         )
     return left

@@ -327,7 +327,7 @@ def damping_by_modes(parts: Mapping[str, Part], *, reduced: bool) -> Damping | D
                 return DampingOfParts(tuple(zip(parts, found, strict=True)))
             raise input_error(
                 f"part.{name}.damping",
-                "differs, and on a wheel modes are those of all parts of a sector together, which are reduced",
+                "differs, and on a wheel all parts of a sector have their modes together",
                 "Give all parts the same damping by modes or another form, or reduce none.",
             )
     return found[0] if found else None

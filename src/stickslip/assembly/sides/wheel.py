@@ -434,7 +434,7 @@ def _refuse_joined(name: str, moving: Structure, across: tuple[Matrix, ...]) -> 
         if np.abs(dense[across]).max(initial=0.0) > JOINED * np.abs(dense).max(initial=0.0):
             raise input_error(
                 f"part.{name}.damping",
-                "differs from that of a part it is joined to, and modes are those of both together",
+                "differs from the value of a part joined to it, and both have their modes together",
                 "Give them the same damping by modes, or another form.",
             )
 

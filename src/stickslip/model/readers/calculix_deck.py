@@ -369,7 +369,7 @@ def _axis(model: DeckModel, units: Units) -> Axis:
         parallel = np.linalg.norm(first.cross @ axis.unit) < PAIRED
         away = float(np.linalg.norm(first.arm(np.array([axis.origin]))))
         if not parallel or away > PAIRED * max(1.0, float(np.linalg.norm(axis.origin))):
-            raise input_error(place, "its axis is another one than that of the cyclic symmetry", "Use one axis.")
+            raise input_error(place, "its axis differs from the axis of the cyclic symmetry", "Use one axis.")
     return first
 
 

@@ -48,7 +48,7 @@ def read_matrix_market(path: Path, n: int | None) -> Matrix:
         raise input_error(
             f"{path}: line 1",
             f"is no Matrix Market matrix of numbers: {first[:SHOWN]!r}",
-            "Its first line is %%MatrixMarket matrix coordinate real symmetric, or the like; "
+            "Its first line begins with %%MatrixMarket matrix, for example %%MatrixMarket matrix coordinate real symmetric; "
             "matrices of Abaqus are read by read_abaqus_matrices.",
         )
     # comments become empty lines, so that line numbers stay

@@ -176,7 +176,7 @@ def structure_summary(structure: Structure, *, n_modes: int = 10, units: Units =
     symmetric = max(asymmetry(structure.mass), asymmetry(structure.stiffness)) <= SYMMETRY
     travelling = np.iscomplexobj(structure.stiffness)
     if travelling:
-        remarks.append("Complex matrices, those of a travelling wave.")
+        remarks.append("Complex matrices, of a travelling wave.")
     mass = None if travelling else translational_mass(structure)
     summary = ModelSummary(
         "matrices",

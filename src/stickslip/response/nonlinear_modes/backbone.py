@@ -344,7 +344,7 @@ def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bo
         if found.p != last:
             return f"gross slip at {millimetres(end.amplitude)}"
         if slips is None and end.sticking == 0.0:
-            return f"amplitude reached, no contact sticks at {millimetres(end.amplitude)}: those that do not slip stay open"
+            return f"amplitude reached, no contact sticks at {millimetres(end.amplitude)}; contacts that do not slip stay open"
         return f"amplitude reached{'' if slips is None else f', gross slip from {millimetres(slips)} on'}"
     told = f"{millimetres(end.amplitude)} after {len(points)} points"
     if end.open_for > 0.0:

@@ -254,7 +254,7 @@ def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:
     if np.any(np.abs(load.static - backbone.load.static) > 1e-9 * backbone.load.scale):
         raise input_error(
             "modal_synthesis",
-            "the static load is another one than that of the backbone",
+            "the static load differs from the backbone's",
             "Follow the nonlinear mode under the same static load.",
         )
     return force

@@ -141,7 +141,7 @@ def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
         worst = min(worst, float(np.abs(found - chosen.reported).max() / size))
         if worst <= AGREE:
             return whole, fields
-    what = f"the outputs of the model move otherwise than those of the result, by {100 * worst:.2g} %"
+    what = f"the outputs of the model differ from the outputs of the result by {100 * worst:.2g} %"
     raise input_error("export", what, CHANGED)
 
 

@@ -308,5 +308,5 @@ def _refuse_numbers(columns: MeasuredColumns, who: str, once: FloatArray, sector
         raise input_error(
             place,
             f"lacks {', '.join(map(str, missing))} of the waves 0 to {sectors - 1}",
-            "Give them all, or coefficients by neighbour, of which those that are left out are zero.",
+            "Give them all, or coefficients by neighbour; the ones left out are zero.",
         )

@@ -188,7 +188,7 @@ def _quantity(columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[s
         raise input_error(
             f"{columns.path}: line 1",
             f"has both {name}_std and {name}_half_width",
-            "Give one of them: a half-width is that of an interval of your own.",
+            "Give one of them; a half-width belongs to an interval of your own.",
         )
     for bar, (other, errors) in given.items():
         if other != unit:

@@ -77,9 +77,7 @@ class AeroTable(Section):
         of_modes = {"shapes", "mode", "largest_displacement_m", "over", "contacts"}
         strange = sorted(of_modes & self.model_fields_set) if self.points else []
         if strange:
-            raise custom_error(
-                "belongs to modes, and the coefficients are those of points", "Leave one out.", strange[0]
-            )
+            raise custom_error("belongs to modes, and the coefficients belong to points", "Leave one out.", strange[0])
         if self.over is not None and self.largest_displacement_m is None:
             raise custom_error("is given without largest_displacement_m", "Leave it out.", "over")
         return self
