@@ -283,7 +283,7 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
     with pytest.raises(InputError, match="made in Python"):
         wheel[0].export(folder=tmp_path)
     other = ss.Study.from_file(folder / "study.toml").replace({"material.young_modulus_pa": 1.9e11})
-    with pytest.raises(InputError, match="otherwise than those of the result"):
+    with pytest.raises(InputError, match="the outputs of the model differ from the outputs of the result"):
         result.export(of=other.model(), folder=tmp_path)
     moved = ss.Result(result.data, tmp_path / "result.nc")
     with pytest.raises(InputError, match="--of FOLDER"):
