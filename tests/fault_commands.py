@@ -128,7 +128,7 @@ class Trial:
 
         It has all cases of the analyses that were `asked` for, and of the others those that earlier commands finished.
         """
-        found = Result.open(self.results).data
+        found = Result.from_file(self.results).data
         if found.attrs["complete"] != 1:
             self.fail(f"{what}: the result is not complete")
         for name in {*asked, *found.children}:
@@ -148,7 +148,7 @@ class Trial:
         """Look whether every file that is there is whole."""
         if (self.results / "result.nc").exists():
             try:
-                Result.open(self.results)
+                Result.from_file(self.results)
             except InputError as error:
                 self.fail(f"{what}: {error}")
         page = self.results / "report.html"

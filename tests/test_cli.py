@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 from collections import namedtuple
-from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,13 +19,13 @@ from small_v2 import write_example_deck, write_four_masses, write_shrouded_deck,
 from typer.testing import CliRunner, Result
 
 import stickslip
-from stickslip.api import result as front
-from stickslip.api.study import Study
+from stickslip.api import study as front
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.model import blas_threads
 from stickslip.study.check import SECTIONS
 from stickslip.study.file.example import Kind, example_text
+from stickslip.study.outcome import Outcome
 from stickslip.study.store import threads
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import Interrupted
@@ -150,7 +149,7 @@ def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
     if kind == "file":
         assert "part.blade.file: there is no file" in refused("check", str(path))
     else:
-        assert Study.from_file(path).content.asked
+        assert front.Study.from_file(path).content.asked
 
 
 # the other kinds are examples of the repository, which tests/test_journeys.py or others go through
@@ -284,7 +283,7 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     assert str(results / "report.html") in done("report", str(results))
     page = (results / "report.html").read_text(encoding="utf-8")
     # terminal, page and Python say the same
-    found, told = front.Result.open(results), html.unescape(re.sub(r"<[^>]*>", "", page))
+    found, told = front.Result.from_file(results), html.unescape(re.sub(r"<[^>]*>", "", page))
     assert found.verdicts
     for v in found.verdicts:
         assert v.why[1:] in told  # a sentence without a frequency begins with a capital
@@ -384,8 +383,8 @@ def test_exit_codes_tell_points_without_solution_and_interruptions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_four_masses(tmp_path)
-    good = front.Result(xr.DataTree(xr.Dataset(attrs={"title": "t"})))
-    monkeypatch.setattr(Study, "run", lambda *_, **__: replace(good, failed=2))
+    tree = xr.DataTree(xr.Dataset(attrs={"title": "t"}))
+    monkeypatch.setattr(front, "answers", lambda *_, **__: Outcome(tree, {}, 2, ()))
     ended = invoke("run", str(path), "--no-report")
     assert ended.exit_code == 1
     assert "2 of the points: marked in the result and in the report, not filled in" in ended.output
@@ -394,7 +393,7 @@ def test_exit_codes_tell_points_without_solution_and_interruptions(
         text = "Interrupted. The same command goes on from there."
         raise Interrupted(text)
 
-    monkeypatch.setattr(Study, "run", stopped)
+    monkeypatch.setattr(front, "answers", stopped)
     ended = invoke("run", str(path))
     assert ended.exit_code == 130
     assert "The same command goes on" in ended.stderr

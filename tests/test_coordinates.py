@@ -30,7 +30,7 @@ def _varied(**keys: list[float] | list[str]) -> xr.Dataset:
 def response(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     """A response at three load ratios, as an earlier version stored it, opened."""
     stored = ss.Result(tree_of(forced_response=synthetic_result(ratios=(20, 5, 2), n=24)))
-    return ss.Result.open(stored.save(tmp_path_factory.mktemp("stored")))["forced_response"]
+    return ss.Result.from_file(stored.save(tmp_path_factory.mktemp("stored")))["forced_response"]
 
 
 def test_a_case_is_taken_by_the_value_of_its_key(response: xr.Dataset) -> None:

@@ -3,6 +3,7 @@
 import importlib
 
 import pytest
+import xarray as xr
 
 import stickslip as ss
 from stickslip.contact import neighbours
@@ -32,3 +33,9 @@ def test_other_names_do_not_warn(package):
     assert all(getattr(found, name) is not None for name in found.__all__)
     with pytest.raises(AttributeError, match="no_such_name"):
         found.no_such_name  # noqa: B018
+
+
+def test_a_result_is_still_opened_by_its_old_verb(tmp_path):
+    path = ss.Result(xr.DataTree()).save(tmp_path / "empty.nc")
+    with pytest.warns(DeprecationWarning, match=r"Result\.open goes with 0\.3: Result\.from_file"):
+        assert ss.Result.open(path).path == ss.Result.from_file(path).path == path

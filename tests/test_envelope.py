@@ -17,6 +17,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Dofs, Structure
 from stickslip.response.rotating.envelope import SweepInTime, envelope
 from stickslip.response.system import System
+from stickslip.study.analysis import named
 from stickslip.units import RPM
 
 
@@ -163,7 +164,7 @@ def test_the_example_tells_what_a_fast_run_up_takes_off_the_peak(tmp_path):
     assert np.all(data["fast_finished"].values == 1)
     assert data["fast_neglected"].values[0] < data["fast_neglected"].values[1] < 0.05
     assert not [v for v in result.verdicts if "left out" in v.why]
-    assert [table.title for table in result.summaries["run_up"]][-1] == "Fast run-up"
+    assert [table.title for table in named("run_up").summary(result["run_up"])][-1] == "Fast run-up"
     assert "Fast run-up" in result.report(tmp_path / "report.html").read_text()
 
 

@@ -100,7 +100,7 @@ def test_damaged_results_are_refused_by_name_or_give_the_same_numbers(
         path.write_bytes(content)
         try:
             of_file = path.suffix == ".nc"
-            tree = Result.open(path).data if of_file else run_study(read_study(tmp_path / "study.toml")).tree
+            tree = Result.from_file(path).data if of_file else run_study(read_study(tmp_path / "study.toml")).tree
         except InputError as error:
             told = error.place == str(path) and "--fresh" in str(error)
             counted["refused" if told else f"{number}: {error}"] += 1
@@ -162,7 +162,7 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path) -> None:
     (tmp_path / "b.nc").symlink_to(tmp_path / "mine")
     write_tree(tree, tmp_path / "b.nc")
     assert (tmp_path / "mine").read_text() == "mine"
-    assert Result.open(tmp_path / "b.nc").data.a.sum() == 3.0
+    assert Result.from_file(tmp_path / "b.nc").data.a.sum() == 3.0
     assert list(tmp_path.glob("b.*.part.nc")) == []
 
 
@@ -224,7 +224,7 @@ def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
     assert second.exit_code == 2
     assert "another run is at work in it. Wait for it, or stop it." in second.stderr
     assert at_work == 0
-    assert Result.open(tmp_path / "results").data.attrs["complete"] == 1
+    assert Result.from_file(tmp_path / "results").data.attrs["complete"] == 1
 
 
 def test_an_interrupt_waits_until_a_result_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

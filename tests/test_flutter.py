@@ -25,6 +25,7 @@ from stickslip.model.structure import nodal_dofs
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction import InfluenceCoefficients
 from stickslip.response.rotating.flutter import flutter_of_wave
+from stickslip.study.analysis import named
 from stickslip.study.models.study import read_study
 
 N = fluid.BLADES
@@ -117,7 +118,7 @@ def test_coefficients_recorded_with_one_moved_blade_give_the_eigenvalues_of_the_
     for w, angle in enumerate(data["phase_angle_deg"].values):
         on_curve = [np.interp(angle, data["curve_angle_deg"], row) for row in data["curve_damping"]]
         np.testing.assert_allclose(on_curve, data["damping_by_energy"][w], rtol=1e-9)
-    assert "the least stable is" in result.summaries["flutter"][0].title
+    assert "the least stable is" in named("flutter").summary(result["flutter"])[0].title
 
 
 def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
@@ -435,8 +436,8 @@ def test_the_example_tells_its_margin_in_terminal_and_page(tmp_path: Path) -> No
     assert least == 15
     assert float(flutter["damping"].min()) < 0
     assert any("ND 5 forward, mode 1 grows" in str(v) for v in result.verdicts)
-    assert "ND 5 forward, mode 1" in result.summaries["flutter"][0].title
-    assert any("in the flow" in t.title for t in result.summaries["modes"])
+    assert "ND 5 forward, mode 1" in named("flutter").summary(result["flutter"])[0].title
+    assert any("in the flow" in t.title for t in named("modes").summary(result["modes"]))
     page = tmp_path / "page.html"
     result.report(page)
     html = page.read_text()

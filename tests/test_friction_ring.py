@@ -23,7 +23,7 @@ def run(folder: Path, text: str, changes: dict[str, str], *only: str) -> xr.Data
     folder.mkdir()
     (folder / "study.toml").write_text(changed(text, changes))
     done("run", str(folder / "study.toml"), "--no-report", "--only", *only)
-    return Result.open(folder / "results").data[only[0]].to_dataset()
+    return Result.from_file(folder / "results").data[only[0]].to_dataset()
 
 
 def at_fixed(folder: Path, harmonics: list[int], changes: dict[str, str] | None = None) -> xr.Dataset:

@@ -63,11 +63,11 @@ def test_peaks_are_a_table(everything: Result) -> None:
 
 
 def test_a_saved_result_is_the_same_and_opens_with_xarray_alone(everything: Result, tmp_path: Path) -> None:
-    again = Result.open(everything.save(tmp_path))
+    again = Result.from_file(everything.save(tmp_path))
     assert again.path == tmp_path / "result.nc"
     nodes = {name: with_coordinates(everything[name], name) for name in everything}
     xr.testing.assert_identical(again.data, tree_of(provenance(), **nodes))
-    assert Result.open(tmp_path).plots == everything.plots
+    assert Result.from_file(tmp_path).plots == everything.plots
     with xr.open_datatree(tmp_path / "result.nc", engine="h5netcdf") as tree:
         assert list(tree.children) == ["forced_response", "modes", "campbell", "safe"]
         assert tree["forced_response"]["frequency_hz"].attrs["units"] == "Hz"

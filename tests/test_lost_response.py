@@ -26,7 +26,7 @@ FEW = {
 def run(study: Path) -> tuple[int, str, Result]:
     ended = CliRunner().invoke(app, ["run", str(study)])
     assert (study.parent / "results" / "report.html").is_file(), ended.output
-    return ended.exit_code, " ".join(ended.output.split()), Result.open(study.parent / "results")
+    return ended.exit_code, " ".join(ended.output.split()), Result.from_file(study.parent / "results")
 
 
 @pytest.mark.parametrize(("error", "high"), [(SingularError, '"auto"'), (FloatingPointError, "5")])

@@ -86,7 +86,7 @@ def test_the_caption_tells_source_bars_and_agreement(run: tuple[Path, ss.Result]
 
 def test_the_result_keeps_them_with_their_source(run: tuple[Path, ss.Result]) -> None:
     path, result = run
-    data = ss.Result.open(path.parent / "results")["forced_response"]
+    data = ss.Result.from_file(path.parent / "results")["forced_response"]
     assert data.attrs["measured_source"] == "rig 3 & co"
     assert data.attrs["measured_file"] == "peaks.csv"
     assert data.attrs["measured_key"] == KEY

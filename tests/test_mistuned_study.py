@@ -14,6 +14,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.mistuned import mistuned_wheel
+from stickslip.study.analysis import named
 
 ROOT = Path(__file__).parents[1]
 TURN = 2 * np.pi
@@ -121,8 +122,8 @@ def test_page_and_terminal_speak_of_the_blades(ring, tmp_path: Path) -> None:
         assert text in page
     printed = "\n".join(
         " ".join((t.title, *(c for row in t.rows for c in row), *t.lines))
-        for tables in ring.summaries.values()
-        for t in tables
+        for name in ring
+        for t in named(name).summary(ring[name])
     )
     assert "1.3299" in printed
     assert "Modes of the wheel" in printed

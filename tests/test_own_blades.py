@@ -64,7 +64,7 @@ def about_y(degrees: float) -> np.ndarray:
 def test_the_study_finds_the_stuck_resonance_and_forces_that_balance_the_pull(tmp_path: Path) -> None:
     path = write(tmp_path, FEW)
     done("run", str(path), "--no-report")
-    data = Result.open(tmp_path / "results").data
+    data = Result.from_file(tmp_path / "results").data
     response = data["forced_response"]
     stuck = natural_frequencies(read_study(path).model().at(0.0, 0, "stuck"), 1)[0]
     assert float(response["peak_frequency_hz"][0]) == pytest.approx(stuck, rel=1e-3)

@@ -47,7 +47,7 @@ def write(folder: Path, part: str, dof: str) -> Path:
 
 def response(path: Path) -> np.ndarray:
     done("run", str(path), "--no-report")
-    data = Result.open(path.parent / "results").data["forced_response"]
+    data = Result.from_file(path.parent / "results").data["forced_response"]
     return np.column_stack([data["frequency_hz"], data["amplitude"]])
 
 

@@ -152,7 +152,7 @@ def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(tmp
     keys = {"points": "6", "peak_points": "4", "stability": '"off"'}
     path = write(tmp_path, {f"forced_response.{key}": value for key, value in keys.items()})
     done("run", str(path), "--no-report", "--only", "forced_response")
-    data = Result.open(tmp_path / "results").data
+    data = Result.from_file(tmp_path / "results").data
     response = data["forced_response"]
     stuck = natural_frequencies(read_study(path).model().at(6000 * RPM, 6, "stuck"), 1)[0]
     assert float(response["peak_frequency_hz"][0]) == pytest.approx(stuck, rel=2e-3)

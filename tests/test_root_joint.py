@@ -186,7 +186,7 @@ def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     assert large < 0.7 * small
     assert data["peak_frequency_hz"].values[1] < data["peak_frequency_hz"].values[0]
     # the page maps the flanks: at the larger force more of them slips
-    drawn = Result.open(tmp_path / "results").plot("surface").data
+    drawn = Result.from_file(tmp_path / "results").plot("surface").data
     shares = [(t.meta, t.marker.color) for t in drawn if t.marker.color is not None]
     slip = [np.mean([color for meta, color in shares if meta == case]) for case in (0, 1)]
     assert slip[1] > slip[0] + 5

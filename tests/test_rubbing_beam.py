@@ -84,7 +84,7 @@ def rubbing(structure, limit: float, stiffness: float, steps: int, periods: int 
 def test_the_orbit_of_the_tip_is_that_of_time_integration(tmp_path: Path) -> None:
     path = write(tmp_path, SMALL)
     done("run", str(path), "--no-report")
-    data = Result.open(tmp_path / "results").data["forced_response"].dataset
+    data = Result.from_file(tmp_path / "results").data["forced_response"].dataset
     at = int(np.flatnonzero(data["frequency_hz"] == HERTZ)[-1])
     found = data["amplitude"].sel(output=["tip.y", "tip.z"]).values[at]
     model = read_study(path).model()

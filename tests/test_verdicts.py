@@ -640,7 +640,7 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
         "harmonics.alert_threshold_percent": "0.001",
     }
     said = done("run", str(write_four_masses(tmp_path, changes)))
-    result = ss.Result.open(tmp_path / "results")
+    result = ss.Result.from_file(tmp_path / "results")
     data = result["forced_response"]
     assert data.case_verdict.values.tolist() == [0, 1]
     assert data.case_verdict.attrs["flag_meanings"] == "trusted doubtful wrong"

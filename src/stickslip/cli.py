@@ -104,7 +104,11 @@ def run(
     """Run the analyses of a study; an interrupted run continues where it stopped."""
     with _errors_as_text():
         with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
-            result = read(study).run(
+            content = read(study)
+            from stickslip.api.study import answers
+
+            outcome = answers(
+                content,
                 workers=workers,
                 only=only or (),
                 fresh=fresh,
@@ -114,12 +118,15 @@ def run(
                 executor=executor,
                 shard=shard,
             )
-        if result.waits:
+        if outcome.waits:
             raise typer.Exit(DONE)
+        from stickslip.api.result import result_of
+
+        result = result_of(outcome)
         files = [*result.files, *([result.report()] if report else [])]
         from stickslip.study.verdict import in_lines, stored
 
-        for table in (t for tables in result.summaries.values() for t in tables):
+        for table in (t for tables in outcome.summaries.values() for t in tables):
             if verbose or not table.detail:
                 say_table(table.title, table.head, table.rows, table.lines)
         points = result.failed - len(stored(result.data.attrs))  # jobs set aside are no points
@@ -201,7 +208,7 @@ def export(
         from stickslip.api.result import Result
 
         with on_screen(Screen(console())):
-            files = Result.open(result).export(
+            files = Result.from_file(result).export(
                 to,
                 out,
                 case=case,

@@ -145,10 +145,10 @@ def _opened(given: Compared) -> Result | MeasuredCurve:
     if path.suffix.lower() == ".csv":
         return read_curve(path)
     if path.suffix == ".toml":
-        return Result.open(Study.from_file(path).folder)
+        return Result.from_file(Study.from_file(path).folder)
     if path.is_dir() and not (path / RESULT).is_file() and (path / _FOLDER / RESULT).is_file():
-        return Result.open(path / _FOLDER)
-    return Result.open(path)
+        return Result.from_file(path / _FOLDER)
+    return Result.from_file(path)
 
 
 def _names(compared: Sequence[Compared]) -> list[str]:

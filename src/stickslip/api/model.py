@@ -1,7 +1,7 @@
 """A model that answers questions itself, without any file."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -27,7 +27,7 @@ from stickslip.api.keys import (
     RunUpKeys,
     SafeKeys,
 )
-from stickslip.api.result import Result
+from stickslip.api.result import Result, result_of
 from stickslip.api.screen import by_default
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
@@ -202,8 +202,11 @@ class Model(Assembly):
         with by_default(), one_loaded_blas_thread():
             title = f"{name.replace('_', ' ').capitalize()} of a model"
             outcome = answer(named(name), [case], title, as_tables(self, name, keys))
-        result = Result.of(outcome)
-        return result if folder is None else result.saved(Path(folder))
+        result = result_of(outcome)
+        if folder is None:
+            return result
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        return replace(result, path=result.save(folder))
 
     def __repr__(self) -> str:
         lines = [f"Model: {_counted(self)}"]

@@ -1,7 +1,8 @@
 """A result in Python: data, figures, peaks, page."""
 
+import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -18,7 +19,6 @@ from stickslip.api.table import dataframe
 from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
 from stickslip.report.result import RESULT, open_result
-from stickslip.study.analysis import TextTable
 from stickslip.study.coordinates import selectable
 from stickslip.study.outcome import Outcome
 from stickslip.study.store.netcdf import write_tree
@@ -39,31 +39,24 @@ class Result:
         All files that the run wrote.
     failed
         Number of points without a solution.
-    summaries
-        Tables of the terminal for each analysis; empty for a result read from a file.
-    waits
-        Shards still missing, in words; empty for a complete result.
     """
 
     data: xr.DataTree
     path: Path | None = None
     files: tuple[Path, ...] = ()
     failed: int = 0
-    summaries: dict[str, tuple[TextTable, ...]] = field(default_factory=dict)
-    waits: str = ""
 
     @classmethod
-    def open(cls, path: str | Path) -> "Result":
+    def from_file(cls, path: str | Path) -> "Result":
         """Read a result file, or the result in a folder."""
         path = Path(path)
         return cls(open_result(path), path / RESULT if path.is_dir() else path)
 
     @classmethod
-    def of(cls, outcome: Outcome) -> "Result":
-        """Return the result of a run."""
-        path = outcome.files[0] if outcome.files and not outcome.waits else None
-        found = (outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
-        return cls(*found, outcome.waits)
+    def open(cls, path: str | Path) -> "Result":
+        """Read a result as `from_file` does; deprecated."""
+        warnings.warn("Result.open goes with 0.3: Result.from_file does the same", DeprecationWarning, stacklevel=2)
+        return cls.from_file(path)
 
     def __getitem__(self, name: str) -> xr.Dataset:
         """Return the dataset of an analysis; ``.sel(force_n=5)`` takes the points, or cases, with a value of a varied key.
@@ -244,11 +237,6 @@ class Result:
         """The last line of a run: `not_trusted`, or the statement that every answer is trusted, with the number of single points that are not."""
         return conclusion(self.data)
 
-    def saved(self, folder: Path) -> "Result":
-        """Write the result into a folder, which is created if missing; return the result with its file."""
-        folder.mkdir(parents=True, exist_ok=True)
-        return replace(self, path=self.save(folder))
-
     def __repr__(self) -> str:
         title = str(self.data.attrs.get("title", "")) or "untitled"
         lines = [f"Result: {title}", f"  file: {self.path or 'in memory'}"]
@@ -263,6 +251,12 @@ class Result:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
+
+
+def result_of(outcome: Outcome) -> Result:
+    """Return the result of a run; a shard that waits for others has no file yet."""
+    path = outcome.files[0] if outcome.files and not outcome.waits else None
+    return Result(outcome.tree, path, outcome.files, outcome.failed)
 
 
 def _peaks(data: xr.Dataset) -> pd.DataFrame:

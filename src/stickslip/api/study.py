@@ -11,12 +11,13 @@ from typing import Any
 
 from stickslip.analyses.forced_response.problem import HARMONICS, IN_TIME
 from stickslip.api.model import Model
-from stickslip.api.result import Result
+from stickslip.api.result import Result, result_of
 from stickslip.api.screen import by_default
 from stickslip.model.blas_threads import one_loaded_blas_thread
 from stickslip.study.check import check_study
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
+from stickslip.study.outcome import Outcome
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
 
@@ -106,18 +107,19 @@ class Study:
         InputError
             If the study, its files or its folder do not allow a run; raised before any long computation.
         """
-        asked = {IN_TIME: verify, HARMONICS: verify_harmonics}
-        checks = [name for name, wanted in asked.items() if wanted]
-        names = [only] if isinstance(only, str) else list(only)
-        content = self.content
-        if folder is not None:
-            content = _Elsewhere(content.file, content.memo, Path(realpath(folder)))
-        share = None if shard is None else Shard.read(shard)
-        with by_default(workers), one_loaded_blas_thread():
-            outcome = run_study(
-                content, only=names, workers=workers, kind=executor, shard=share, fresh=fresh, checks=checks
+        return result_of(
+            answers(
+                self,
+                workers=workers,
+                only=only,
+                fresh=fresh,
+                verify=verify,
+                verify_harmonics=verify_harmonics,
+                folder=folder,
+                executor=executor,
+                shard=shard,
             )
-        return Result.of(outcome)
+        )
 
     def check(self) -> tuple[str, ...]:
         """Build every model, find its static state and natural frequencies, and estimate the cost; return warnings.
@@ -171,3 +173,27 @@ class Study:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"
+
+
+def answers(  # noqa: PLR0913
+    study: Study,
+    *,
+    workers: int = 1,
+    only: Sequence[str] = (),
+    fresh: bool = False,
+    verify: bool = False,
+    verify_harmonics: bool = False,
+    folder: str | Path | None = None,
+    executor: str | Executor = "",
+    shard: str | None = None,
+) -> Outcome:
+    """Run a study and return the result with what the terminal shows of it; arguments as in `Study.run`."""
+    asked = {IN_TIME: verify, HARMONICS: verify_harmonics}
+    checks = [name for name, wanted in asked.items() if wanted]
+    names = [only] if isinstance(only, str) else list(only)
+    content = study.content
+    if folder is not None:
+        content = _Elsewhere(content.file, content.memo, Path(realpath(folder)))
+    share = None if shard is None else Shard.read(shard)
+    with by_default(workers), one_loaded_blas_thread():
+        return run_study(content, only=names, workers=workers, kind=executor, shard=share, fresh=fresh, checks=checks)
