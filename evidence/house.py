@@ -34,6 +34,7 @@ REASONS = {
     "study.check": "the command check",
     "study.exchange.frd": "a file format",
     "study.file.example": "read by the command new alone",
+    "study.models.beforehand": "the first line of check, before anything that computes is imported",
     "study.inspect_file": "the command inspect",
 }
 
