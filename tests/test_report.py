@@ -159,6 +159,22 @@ document.body.dataset.shown = shown.map(t => t.meta).join();
 </script>"""
 
 
+# bottoms of the verdict line, the answer and its figure, height of the curve's panel, and the words that are shown above 900 px
+FIRST = """(() => {
+  const bottom = s => document.querySelector(s).getBoundingClientRect().bottom + scrollY;
+  const walk = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT), words = [];
+  while (walk.nextNode()) {
+    const own = walk.currentNode, range = document.createRange();
+    range.selectNodeContents(own);
+    const box = range.getBoundingClientRect();
+    if (own.parentElement.closest("svg, script, style, .modebar") || !own.parentElement.checkVisibility() || box.top + scrollY > 900) continue;
+    words.push(...own.data.split(/\\s+/).filter(Boolean));
+  }
+  const drawn = document.querySelector("figure .nsewdrag").getBoundingClientRect();
+  return {verdict: bottom(".box"), answer: bottom(".answer"), figure: bottom("figure"), wide: drawn.width, words: words.length, all: words.join(" ")};
+})()"""
+
+
 @dataclass(frozen=True)
 class Tried:
     """What came of a page in windows of several widths, in the dark, and on paper."""
@@ -191,6 +207,22 @@ def opened(browser: Browser, page: Path, tmp_path_factory: pytest.TempPathFactor
     tried = Tried(sideways, contrasts, sheets, browser.run("window.folded ?? -1"))
     dom = browser.run("document.documentElement.outerHTML")
     return Opened(dom, [*seen.errors, *browser.errors]), tried
+
+
+@needs_browser
+@pytest.mark.parametrize("ratios", [(50, 20, 5), (5,)])
+def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
+    browser: Browser, tmp_path: Path, ratios: tuple[float, ...]
+) -> None:
+    page = tmp_path / "report.html"
+    page.write_text(html_of(synthetic_result(ratios=ratios)), encoding="utf-8")
+    browser.width(760)
+    browser.open(page)
+    browser.until("document.querySelector('figure .nsewdrag')")
+    first = browser.run(FIRST)
+    assert first["verdict"] < first["answer"] < first["figure"] < 900
+    assert first["wide"] >= 480
+    assert 20 < first["words"] <= 90, first["all"]
 
 
 def test_page_is_one_small_file_without_network(page: Path) -> None:
@@ -692,7 +724,7 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     )
     html = report_html(tree)
     assert "<h2>The toy</h2>" in html
-    assert "<summary>Figure 1. A toy</summary>Its answer." in html
+    assert "<summary>Figure 1. A toy</summary><span>Its answer." in html
     assert "<p><b>42</b> &lt; 43</p>" in html
     assert list(plots(tree)) == ["toy"]
     assert '<li><b class="doubtful">DOUBTFUL:</b> So so.' in html
