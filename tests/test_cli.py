@@ -192,7 +192,7 @@ def test_check_doubts_units(tmp_path: Path) -> None:
     far = write_four_masses(tmp_path / "far", {"forced_response.frequency_hz": "[8000.0, 16000.0]"})
     said = done("check", str(far))
     assert "the nearest natural frequency, " in said
-    assert "times below the range. Check the units: lengths in mm" in said
+    assert "times below the range. Check the units: mm for m shifts" in said
     soft = write_two_blades(
         tmp_path / "soft", {"contact.flat.normal_stiffness_n_per_m": "5e4", "part.damper.mass_kg": "3.0"}
     )
@@ -266,6 +266,8 @@ def test_check_says_once_what_holds_for_all_cases(tmp_path: Path) -> None:
     assert said.count("force 5 N") == 1
     assert len([line for line in said if "natural frequencies, contacts open" in line]) == 1
     assert "the same holds for: force 8 N, 9 N" in said
+    sentences = [text.split() for line in said for text in re.split(r"; |\. ", line)]
+    assert [" ".join(words) for words in sentences if len(words) > 20] == []
 
 
 def test_masses_from_new_to_the_page(tmp_path: Path) -> None:

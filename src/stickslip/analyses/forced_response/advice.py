@@ -143,7 +143,7 @@ def _of_contact(name: str, normal: FloatArray, along: FloatArray, mu: FloatArray
     each = f"{least:.3g} to {most:.3g} N each" if closed.sum() > 1 else "at one point"
     ratio = along[closed].sum(axis=0).max() / total  # elastic_coulomb bounds each direction by itself
     friction = f", T/N {ratio:.2g} of at most {np.mean(mu[closed]):.2g}" if np.all(np.isfinite(mu[closed])) else ""
-    return f"contact {name}: {closed.sum()} of {normal.size} points closed, {total:.3g} N in all, {each}{friction}"
+    return f"contact {name}: {closed.sum()} of {normal.size} closed, {total:.3g} N, {each}{friction}"
 
 
 def units_in_doubt(question: Question, model: Model) -> Iterator[str]:
@@ -182,8 +182,8 @@ def _frequencies_far_off(question: Question) -> Iterator[str]:
         return
     which, where = (every.min(), "above") if every.min() > highest else (every.max(), "below")
     yield (
-        f"the nearest natural frequency, {which:.4g} Hz, lies {factor:.3g} times {where} the range. Check the units: lengths in mm instead of "
-        "m shift frequencies 1000 times, a mass or stiffness a thousand times off 31.6 times."
+        f"the nearest natural frequency, {which:.4g} Hz, lies {factor:.3g} times {where} the range. Check the units: mm for m shifts "
+        "frequencies 1000 times, a mass or stiffness 1000 times off 31.6 times."
     )
 
 
@@ -192,10 +192,8 @@ def _of_friction(physics: Physics | None) -> Iterator[str]:
     damped = [] if physics is None else physics.damped[:NAMED_MODES]
     for mode in damped:
         stuck, best, ends = (omega / HZ for omega in (mode.stuck, mode.best, mode.ends))
-        yield (
-            f"friction damps the mode at {stuck:.2f} Hz by up to {100 * mode.ratio:.2g} % of critical, at {best:.2f} Hz; sliding freely, it "
-            f"is at {ends:.2f} Hz"
-        )
+        yield f"friction damps the mode at {stuck:.2f} Hz by up to {100 * mode.ratio:.2g} % of critical, at {best:.2f} Hz"
+        yield f"sliding freely, this mode is at {ends:.2f} Hz"
     if damped:
         yield "this estimate holds within a factor of 1.5, for steady normal forces, at the one best amplitude"
 

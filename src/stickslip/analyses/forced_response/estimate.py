@@ -76,7 +76,7 @@ class Estimate:
         many = f", {self.most}" if self.most else ""
         return (
             f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {least} to {most} s to solve this case",
-            f"estimate: least if hardly a contact slips, most if all slip at every point{many}",
+            f"estimate: least if contacts hardly slip, most if all slip{many}",
             f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
             f"estimate: stability and time integration come on top; limits.work_s is compared with {self.seconds:.0f} s",
         )

@@ -42,15 +42,15 @@ def slip_sentence(limits: FlankLimits) -> str:
     """Return whether a flank can slip, with the largest T/N in equilibrium."""
     flank, least = limits.flank, min(limits.most)
     if limits.slips:
-        return f"{flank.name} can slip to and fro: in equilibrium T/N reaches its friction coefficient {flank.friction:.2g}"
-    return f"{flank.name} cannot slip to and fro: in equilibrium T/N reaches {least:.2g} of {flank.friction:.2g}"
+        return f"{flank.name} can slip to and fro, T/N reaches its friction coefficient {flank.friction:.2g}"
+    return f"{flank.name} cannot slip to and fro, T/N reaches only {least:.2g} of {flank.friction:.2g}"
 
 
 def angle_sentence(limits: FlankLimits) -> str:
     """Return the platform angles at which a flank could not slip; empty for a flank that is no plane."""
     if not np.isfinite(limits.angle_deg):
         return ""
-    own = f"{limits.flank.name} is inclined by {limits.angle_deg:.0f} degrees (0: square to the pull)"
+    own = f"{limits.flank.name} is inclined by {limits.angle_deg:.0f} degrees (0 is square to the pull)"
     ranges = [_range(low, high) for low, high in limits.held_deg]
     return f"{own}; it cannot slip {' and '.join(ranges)}" if ranges else f"{own}; no angle keeps it from slipping"
 
