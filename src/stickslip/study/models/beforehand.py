@@ -11,7 +11,7 @@ def before_check(file: StudyFile) -> str:
     case, count = file.cases[0], len(file.cases)
     nodes, waves = nodes_of_tables(case.tables, file.home), _waves(case.tables)
     seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * (waves or 0)), 1.0)
-    of_waves = f", and {nodes * SECONDS_A_WAVE:.2g} s for each wave of a wheel" if waves is None else ""
+    of_waves = f" (a wheel {nodes * SECONDS_A_WAVE:.2g} s more for each wave)" if waves is None else ""
     cases = f"{count} cases" if count > 1 else "one case"
     return f"checking {cases}: parts of about {max(nodes, 1.0):.2g} nodes take some {seconds:.0f} s{of_waves}"
 
