@@ -138,10 +138,22 @@ def test_the_head_holds_best_against_best_and_names_each_case(pair: Comparison) 
     assert labels == ["best peak of a", "best peak of b", f"peak of a at {KEY} = 50", f"peak of b at {KEY} = 50"]
     assert f"with {KEY} = 5;" in head[0].note
     assert f"with {KEY} = 20;" in head[1].note
-    assert head[1].note.endswith(" than best peak of a")
+    assert head[1].note.endswith("; loaded by 20 N, best peak of a by 80 N: not compared")
     assert head[3].note.endswith(f"; 20 % more than peak of a at {KEY} = 50")
     alike = ss.compare(design((50, 5), 1.0, 0.6), design((50, 5), 1.2, 0.4), names=("a", "b"))
     assert [card.label for card in cards(alike.designs, divided=True)] == labels[:2]
+
+
+def test_peaks_under_different_loads_are_not_set_against_each_other(pair: Comparison) -> None:
+    alike = cards(pair.designs, divided=True)[2:]
+    assert "20 % more than" in alike[1].note
+    designs = [design((50,), 1.0, 0.6), design((50,), 1.2, 0.6)]
+    for own, load in zip(designs, (100.0, 5.0), strict=True):
+        data = own.data["forced_response"].to_dataset()
+        own.data["forced_response"] = data.assign(excitation_n=data["excitation_n"] * 0 + load)
+    _, second = cards(ss.compare(*designs, names=("a", "b")).designs, divided=True)
+    assert "than" not in second.note
+    assert second.note.endswith("; loaded by 5 N, peak of a by 100 N: not compared")
 
 
 def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> None:

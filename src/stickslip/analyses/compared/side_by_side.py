@@ -9,6 +9,8 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
+from stickslip.analyses.forced_response.page.curves import DASHES
+from stickslip.analyses.forced_response.page.optimisation import families
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
@@ -163,38 +165,43 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     told = [(d, r) for d, r, own in numbered if own == key and len(r.peaked) > 1]
     if not key or len(told) < 2:
         return None
-    figure, heights = make_subplots(1, 2, horizontal_spacing=0.12), []
+    figure, heights = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38]), []
     curves = []
     for design, response in told:
-        cases = sorted(response.peaked, key=lambda c: c.value)
-        peak = np.array([_peak(response, c, divided=divided) for c in cases])
-        heights.append(peak)
-        curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))
+        groups = families(sorted(response.peaked, key=lambda c: c.value), key)
+        for k, (others, cases) in enumerate(groups.items()):
+            peak = np.array([_peak(response, c, divided=divided) for c in cases])
+            heights.append(peak)
+            name = ", ".join(filter(None, (design.name, others)))
+            drawn_as = {"color": design.colour, "width": 1.8, "dash": DASHES[k % len(DASHES)]}
+            values, hz = [c.value for c in cases], [response.peak_hz(c) for c in cases]
+            curves.append((name, drawn_as, values, peak, hz))
     unit_drawn = unit_of(designs, divided=divided)
     scale = scale_for(np.concatenate(heights), unit_drawn)
-    for design, values, peak, hz in curves:
+    for name, drawn_as, values, peak, hz in curves:
         for panel, (y, unit) in enumerate(((scale.factor * peak, scale.unit), (hz, "Hz")), 1):
             figure.add_scatter(
                 x=values,
                 y=y,
                 mode="lines+markers",
-                name=design.name,
+                name=name,
                 showlegend=panel == 1,
-                legendgroup=design.name,
-                line={"color": design.colour, "width": 1.8},
-                hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{design.name}</extra>",
-                row=1,
-                col=panel,
+                legendgroup=name,
+                line=drawn_as,
+                hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{name}</extra>",
+                row=panel,
+                col=1,
             )
-    styled(figure, 400)
-    every = [value for _, own, _, _ in curves for value in own]
+    styled(figure, 480)
+    every = [value for _, _, own, _, _ in curves for value in own]
     wide = min(every) > 0 and max(every) > 5 * min(every)
-    figure.update_xaxes(title_text=key, type="log" if wide else "linear")
+    figure.update_xaxes(type="log" if wide else "linear")
+    figure.update_xaxes(title_text=key, row=2)
     drawn = scale.factor * np.concatenate(heights)
     over = " / force" if divided else ""
-    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)
-    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])
+    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), row=1)
+    figure.update_yaxes(title_text="peak frequency (Hz)", row=2)
+    lowest = min(((float(np.nanmin(p)), n, v[int(np.nanargmin(p))]) for n, _, v, p, _ in curves), key=lambda t: t[0])
     caption = f"Peak and its frequency over {key}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
@@ -358,7 +365,7 @@ def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
 def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool) -> list[Card]:
     """Return a card for each design at a case, compared with the first design."""
     found: list[Card] = []
-    first, against = float("nan"), ""
+    first, against, loaded = float("nan"), "", float("nan")
     for design, case in pairs:
         response = design.response
         if case is None or response is None:
@@ -366,12 +373,19 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
         height = _peak(response, case, divided=divided)
         note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
         if not found:
-            first, against = height, label.format(design.name)
+            first, against, loaded = height, label.format(design.name), case.excitation
+        elif not _same_load(case.excitation, loaded):
+            note += f"; loaded by {quantity(case.excitation, 'N')}, {against} by {quantity(loaded, 'N')}: not compared"
         else:
             off = over_first(height, first)
             note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {against}"
         found.append(Card(quantity(height, unit), label.format(design.name), note))
     return found
+
+
+def _same_load(one: float, other: float) -> bool:
+    """Whether two excitations (N) agree to six digits, or neither is known."""
+    return bool(np.isclose(one, other, rtol=1e-6, atol=0.0, equal_nan=True))
 
 
 def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list[tuple[str, str, list[Content]]]:

@@ -234,7 +234,7 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
     )
 
 
-def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
+def families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
     """Group cases by all varied keys except `key`; each group is a curve."""
     found: dict[str, list[ShownCase]] = {}
     for case in cases:
@@ -254,9 +254,9 @@ def optimisation(response: Response) -> Plot | None:
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
     figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38])
-    families = _families(cases, key)
-    banded = [draw_peak_bands(figure, response, own, scale.factor) for own in families.values()]
-    for name, family in families.items():
+    curves_of = families(cases, key)
+    banded = [draw_peak_bands(figure, response, own, scale.factor) for own in curves_of.values()]
+    for name, family in curves_of.items():
         edge = {"width": 1, "color": "white"}
         mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
         curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
@@ -268,7 +268,7 @@ def optimisation(response: Response) -> Plot | None:
                 line={"color": MUTED, "width": 1.3},
                 marker=mark,
                 name=name,
-                showlegend=row == 1 and len(families) > 1,
+                showlegend=row == 1 and len(curves_of) > 1,
                 text=[c.named for c in family],
                 hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>",
                 row=row,
