@@ -125,7 +125,7 @@ def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_pa
     assert list(case["answer"].values) == ["trusted", "doubtful"]
     (told,) = (v for v in outcome.verdicts if v.rank)
     assert f"meets has {1e3 * swept[1]:.4g} mm" in told.why
-    assert f"detached curve {1e3 * detached[1]:.4g} mm" in told.why
+    assert f"detached curve it is {1e3 * detached[1]:.4g} mm" in told.why
     assert "a sweep does not reach" in told.why
     assert told.remedy.startswith("[all_motions]")
 
