@@ -94,9 +94,10 @@ PAGE_alarms = strategies alarms
 PAGE_second-damper = second_damper
 PAGE_reconstruction = reconstruction
 PAGE_sections = sections
+PAGE_gallery = gallery
 
-pages: $(DOCS_INSTALLED)  ## write a page of docs/ and its pictures anew: NAME=figures, strategies, alarms, second-damper, reconstruction or sections (five to thirty minutes)
-	$(ONE_THREAD) $(BIN)/python -m evidence.$(or $(PAGE_$(NAME)),$(error NAME=figures, strategies, alarms, second-damper, reconstruction or sections))
+pages: $(DOCS_INSTALLED)  ## write a page of docs/ and its pictures anew: NAME=figures, strategies, alarms, second-damper, reconstruction, sections or gallery (five to thirty minutes)
+	$(ONE_THREAD) $(BIN)/python -m evidence.$(or $(PAGE_$(NAME)),$(error NAME=figures, strategies, alarms, second-damper, reconstruction, sections or gallery))
 
 bench: $(INSTALLED)  ## run every benchmark; writes evidence/benchmarks/out/results.json
 	$(ONE_THREAD) $(BIN)/python -m evidence.benchmarks
@@ -155,7 +156,7 @@ release: $(DOCS_INSTALLED)  ## build the wheel, the source archive and the notes
 
 lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, and write the lock files
 	$(PIP_INSTALL) uv
-	$(LOCK) --extra fe --extra exchange --extra test --group editable -o requirements.lock
+	$(LOCK) --extra fe --extra exchange --extra figure --extra test --group editable -o requirements.lock
 	$(LOCK) --extra docs --group release -c requirements.lock -o docs/requirements.lock
 	$(LOCK) --extra readers --extra readers-test --extra sparse --extra cluster -c requirements.lock -c docs/requirements.lock \
 		-o optional-requirements.lock

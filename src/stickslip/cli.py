@@ -226,6 +226,25 @@ def export(
 
 
 @app.command()
+def figure(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The figure; left out: which there are.")] = "",
+    *,
+    to: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A pdf, svg, eps or png file; left out: NAME.pdf.")
+    ] = None,
+    width: Annotated[str, typer.Option(help="Such as 85mm, 8.5cm, 3.35in or 242pt.")] = "85mm",
+    style: Annotated[str, typer.Option(help="A style of matplotlib, by name or file: fonts, sizes, axes.")] = "",
+    case: Annotated[int | None, typer.Option(min=0, help="Which case of \\[vary], where one is shown.")] = None,
+) -> None:
+    """Write a figure for a paper: vectors, in the width of a column."""
+    with _errors_as_text():
+        from stickslip.api.figures import export_figure
+
+        typer.echo(f"{export_figure(result, name, to, width, style, case)} written")
+
+
+@app.command()
 def compare(
     compared: Annotated[
         list[Path],

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,10 +12,11 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force, read_curve
 from stickslip.analyses.compared.side_by_side import comparison_html, contents, peak_rows, unit_of
+from stickslip.api.figures import Backend, plotted
 from stickslip.api.result import Result
 from stickslip.api.study import Study
 from stickslip.api.table import as_text
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import input_error
 from stickslip.report.frame import write_page
 from stickslip.report.plot import Plot
 from stickslip.report.result import RESULT
@@ -56,12 +58,9 @@ class Comparison:
         """Names of the figures."""
         return tuple(self._figures)
 
-    def plot(self, name: str) -> go.Figure:
-        """Return a figure; for an unknown name an `InputError` lists the names."""
-        if name not in self._figures:
-            remedy = did_you_mean(name, list(self._figures))
-            raise input_error(f"plot({name!r})", "is no figure of this comparison", remedy)
-        return self._figures[name]
+    def plot(self, name: str, ax: Any = None, backend: Backend = "plotly") -> Any:
+        """Return a figure of plotly, or draw it by matplotlib; `Result.plot` has the arguments and errors."""
+        return plotted(self._figures, name, ax, backend, None, "comparison")
 
     @property
     def peaks(self) -> pd.DataFrame:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ import xarray as xr
 
 from stickslip.analyses.page import plots, write_report
 from stickslip.api.export import Format, Wanted, export_result
+from stickslip.api.figures import Backend, plotted
 from stickslip.api.screen import by_default
 from stickslip.api.table import dataframe
 from stickslip.assembly.model import Model
@@ -195,18 +197,29 @@ class Result:
         """Names of the figures, in the order of the page."""
         return tuple(self._figures)
 
-    def plot(self, name: str) -> go.Figure:
-        """Return a figure of the page.
+    def plot(self, name: str, ax: Any = None, backend: Backend = "plotly", *, case: int | None = None) -> Any:
+        """Return a figure of the page, or draw it for a paper.
+
+        Parameters
+        ----------
+        name
+            One of `plots`.
+        ax
+            Axes of matplotlib to draw in, one for each panel; the figure is then drawn by matplotlib, and the axes are returned.
+        backend
+            ``plotly``: the figure of the page, a `plotly.graph_objects.Figure`; ``matplotlib``: a new `matplotlib.figure.Figure` with
+            the fonts, sizes and line widths of ``rcParams``, ready for `savefig`.
+        case
+            The case to show, where the page has buttons for it; None: the one that the page shows first.
 
         Raises
         ------
         InputError
-            If the result has none of that name.
+            If the result has no figure of that name, matplotlib cannot draw it, or the axes are not as many as its panels.
+        StickslipError
+            If matplotlib is not installed.
         """
-        if name not in self._figures:
-            known = list(self.plots)
-            raise input_error(f"plot({name!r})", "is no figure of this result", did_you_mean(name, known))
-        return self._figures[name]
+        return plotted(self._figures, name, ax, backend, case, "result")
 
     @property
     def peaks(self) -> pd.DataFrame:
