@@ -128,11 +128,6 @@ class DamperStatics:
     pull: float
     flanks: tuple[FlankLimits, ...]
 
-    @property
-    def slips(self) -> bool:
-        """Whether all flanks can slip to and fro."""
-        return all(limits.slips for limits in self.flanks)
-
 
 def flanks_of(system: System, groups: tuple[str, ...], static_force: FloatArray) -> dict[str, tuple[Flank, ...]]:
     """Return the flanks of each free rigid body that contacts with a friction coefficient touch.

@@ -35,7 +35,7 @@ def of_statics(model: Assembled) -> Iterator[Verdict]:
         why = "; ".join(slip_sentence(limits) for limits in one.flanks)
         angles = [angle_sentence(limits) for limits in one.flanks]
         remedy = " ".join(f"{text[:1].upper()}{text[1:]}." for text in angles if text)
-        yield Verdict("trusted", why=f"{one.name} in static equilibrium: {why}", remedy=remedy, warns=not one.slips)
+        yield Verdict("trusted", why=f"{one.name} in static equilibrium: {why}", remedy=remedy)
 
 
 def slip_sentence(limits: FlankLimits) -> str:
