@@ -45,7 +45,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.forced.response import ForcedPoint, Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
-from stickslip.solve.newton_method import Newton
+from stickslip.solve.newton_method import GLOBALISATIONS, Newton
 from stickslip.solve.status import Status
 from stickslip.study.analysis import Case, Solved
 from stickslip.study.file.harmonics import Harmonics
@@ -508,7 +508,7 @@ def settings(harmonics: dict[str, object] | None = None, **table_: object) -> Si
     return SimpleNamespace(
         forced_response=ForcedResponse(**table_),
         harmonics=Harmonics(**harmonics or {}),
-        solver=SimpleNamespace(evaluator="events", rescue="all"),
+        solver=SimpleNamespace(evaluator="events", rescue="all", globalisation="line_search"),
         limits=SimpleNamespace(memory_gb=4.0, work_s=7200.0),
     )
 
@@ -641,3 +641,20 @@ def test_a_first_run_says_how_long_it_compiled(
         run_study(read_study(path))
     said = [r.getMessage() for r in caplog.records if "compiled" in r.getMessage()]
     assert said[0].startswith("compiled the contact laws in ")
+
+
+def test_each_globalisation_gives_the_same_response(tmp_path: Path) -> None:
+    keys = {"forced_response.frequencies": "5", "forced_response.peak_points": "0", "harmonics.high": "3"}
+    found = {}
+    for name in GLOBALISATIONS:
+        own = keys | {"solver.globalisation": f'"{name}"', "vary.load.shaker.force_n": "[3.0]"}
+        study = read_study(write_four_masses(tmp_path / name, own))
+        assert sweep_of(study.cases()[0].settings, None).newton.globalisation == name
+        outcome = run_study(study)
+        assert outcome.failed == 0
+        found[name] = outcome.tree["forced_response"].to_dataset()
+    first = found["line_search"]
+    for data in found.values():
+        np.testing.assert_array_equal(data.frequency_hz, first.frequency_hz)
+        # each ends where the scaled residual is below 1e-10; the condition of these equations is below 1e4
+        np.testing.assert_allclose(data.amplitude, first.amplitude, rtol=1e-6)

@@ -51,6 +51,8 @@ class SolverKeys(TypedDict, total=False):
 
     evaluator: Literal["intervals", "march", "events"]
     """how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), intervals (transitions on the time samples) or march (sample by sample); default 'events'"""
+    globalisation: Literal["line_search", "dogleg", "levenberg_marquardt"]
+    """what Newton's method of [forced_response] does where a full step does not reduce the residual: line_search shortens it, dogleg bends it towards the gradient (Powell), levenberg_marquardt damps directions of small singular values; default 'line_search'"""
     rescue: Literal["all", "in_time", "off"]
     """what follows where a frequency of [forced_response] does not converge. all: homotopies and other globalisations, up to 300 Newton steps at a point of 60 unknowns, then a start from a periodic motion in time; in_time: the corrector from several starts and from the motion in time, without a branch between listed frequencies, for strong lift-off of many contacts; off: nothing more than the corrector; default 'all'"""
 

@@ -31,6 +31,7 @@ from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
+from stickslip.solve.newton_method import Newton
 from stickslip.study.analysis import Case
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.verdict import said
@@ -85,6 +86,7 @@ def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], d
         low=low,
         high="auto" if h.high == "auto" else h.high_harmonics,
         samples=h.samples,
+        newton=Newton(globalisation=settings.solver.globalisation),
         evaluator=settings.solver.evaluator,
         rescue=settings.solver.rescue,
         cap=max(min(RUNGS[-1] * math.gcd(*low), HIGHEST), MULTIPLE * low[-1]),

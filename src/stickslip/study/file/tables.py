@@ -59,6 +59,11 @@ class Solver(Section):
         description="how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), "
         "intervals (transitions on the time samples) or march (sample by sample)",
     )
+    globalisation: Literal["line_search", "dogleg", "levenberg_marquardt"] = Field(
+        "line_search",
+        description="what Newton's method of [forced_response] does where a full step does not reduce the residual: line_search shortens it, "
+        "dogleg bends it towards the gradient (Powell), levenberg_marquardt damps directions of small singular values",
+    )
     rescue: Rescue = Field(
         "all",
         description="what follows where a frequency of [forced_response] does not converge. all: homotopies and other globalisations, up to 300 Newton steps at a point of 60 unknowns, then a start from a periodic motion in time; in_time: the corrector from several starts and from the motion in time, without a branch between listed frequencies, for strong lift-off of many contacts; off: nothing more than the corrector",
