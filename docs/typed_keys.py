@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import stickslip
 from stickslip.api.model import OF_THE_MODEL
 from stickslip.study.analysis import named
+from stickslip.study.file.harmonics import Selection
 from stickslip.study.file.tables import Tables
 from stickslip.study.questions import ANALYSES
 
@@ -24,7 +25,9 @@ from collections.abc import Sequence
 from typing import Literal, Required, TypedDict
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.selection.strategy import Strategy
 '''
+OWN_STRATEGY = Selection.__metadata__[0]  # of what may also be an object
 ARRAYS = {float: "FloatArray", int: "IntArray"}
 
 
@@ -76,6 +79,7 @@ def _types(kind: Any) -> Iterator[str]:
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Annotated:
         yield from _types(inner[0])
+        yield from ("Strategy" for own in kind.__metadata__ if own == OWN_STRATEGY)
     elif origin in (Union, UnionType):
         for one in inner:
             yield from _types(one)
@@ -101,4 +105,8 @@ def _lines(line: str) -> list[str]:
         return [line]
     head, _, rest = line.partition("Literal[")
     words, _, tail = rest.partition("]")
-    return [f"{head}Literal[", *(f"        {word}," for word in words.split(", ")), f"    ]{tail}"]
+    chosen = [f"        {word}," for word in words.split(", ")]
+    if not tail:
+        return [f"{head}Literal[", *chosen, "    ]"]
+    others = [f"        | {kind}" for kind in tail.removeprefix(" | ").split(" | ")]
+    return [f"{head}(", "        Literal[", *(f"    {word}" for word in chosen), "        ]", *others, "    )"]

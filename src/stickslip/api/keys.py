@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Literal, Required, TypedDict
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.selection.strategy import Strategy
 
 
 class HarmonicsKeys(TypedDict, total=False):
@@ -18,19 +19,22 @@ class HarmonicsKeys(TypedDict, total=False):
     """auto: harmonics are raised (5, 9, 15, 25, 41) until the judgement of each point is quiet, and audited. A number, 1 to 200, or a list such as [1, 3, 5] sets the highest harmonics kept, as published; default 'auto'"""
     samples: int
     """time samples of a period, 16 to 8192; default 256"""
-    selection: Literal[
-        "jacobian_alert",
-        "guarded_alert",
-        "goal_oriented",
-        "grolet",
-        "jaumouille",
-        "laxalde",
-        "maple",
-        "suess_jacobian",
-        "suess_spectral",
-        "always_low",
-        "always_high",
-    ]
+    selection: (
+        Literal[
+            "jacobian_alert",
+            "guarded_alert",
+            "goal_oriented",
+            "grolet",
+            "jaumouille",
+            "laxalde",
+            "maple",
+            "suess_jacobian",
+            "suess_spectral",
+            "always_low",
+            "always_high",
+        ]
+        | Strategy
+    )
     """what chooses the harmonics of a frequency: jacobian_alert, guarded_alert, goal_oriented, grolet, jaumouille, laxalde, maple, suess_jacobian, suess_spectral, always_low, always_high; default 'guarded_alert'"""
     passages: Literal["double", "single"]
     """double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency before the next one, as selections that predict the next frequency always do; default 'double'"""

@@ -1,9 +1,9 @@
 """The table [harmonics]: harmonics that are kept, and their selection."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError, did_you_mean
@@ -20,7 +20,14 @@ PLACES = ("answer", "along", "outputs", "contacts")
 
 Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
 Kept = Harmonic | list[Harmonic]
-Selection: Any = Literal[SELECTIONS]
+
+
+def _named_or_own(given: Any, check: Callable[[Any], Any]) -> Any:
+    """Return a strategy that Python gives as it is; a name is checked."""
+    return given if hasattr(given, "judge") else check(given)
+
+
+Selection: Any = Annotated[Literal[SELECTIONS], WrapValidator(_named_or_own)]
 
 
 class Harmonics(Section):
@@ -123,6 +130,8 @@ class Harmonics(Section):
     @property
     def strategy(self) -> Any:
         """The strategy that chooses harmonics, with the threshold of this table if it has one."""
+        if not isinstance(self.selection, str):
+            return self.selection
         from stickslip.harmonic.selection import strategy_named  # loads the contact kernels
 
         verifies = self.selection in VERIFYING
@@ -136,7 +145,7 @@ class Harmonics(Section):
     @property
     def chooser(self) -> Any:
         """Argument `selection` of a sweep: the name of a strategy, or the strategy with the threshold of this table."""
-        as_named = self.strategy_threshold is None and not self._options
+        as_named = isinstance(self.selection, str) and self.strategy_threshold is None and not self._options
         return self.selection if as_named else self.strategy
 
 
@@ -198,8 +207,15 @@ def _of_options(table: Harmonics) -> Iterator[PydanticCustomError]:
 
 
 def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
-    verifies = table.selection in VERIFYING
     given = {"alert_threshold_percent", "strategy_threshold"} & table.model_fields_set
+    if not isinstance(table.selection, str):
+        name = type(table.selection).__name__
+        yield from (
+            custom_error(f"has no meaning for the strategy {name}", f"Give {name} its own threshold.", key)
+            for key in sorted(given - {"alert_threshold_percent"} if table.high == "auto" else given)
+        )
+        return
+    verifies = table.selection in VERIFYING
     if table.strategy_threshold is not None and table.selection in FIXED:
         yield custom_error(
             f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
