@@ -116,7 +116,7 @@ def journey(python: str, wheel: Path, folder: Path) -> dict[str, list[float]]:
 
 def not_refused(code: int, said: str, package: str) -> str:
     """Return what is wrong with the end of a command that lacks a package of the extra ``fe``; empty where it is a clear refusal."""
-    remedy = f"{package}: not installed. Use: pip install 'stickslip[fe]'"
+    remedy = f"{package} is not installed. Use pip install 'stickslip[fe]'"
     if code and remedy in said and "fault" not in said and "Traceback" not in said:
         return ""
     return f"ended with {code} and did not only say {remedy!r}:\n{said}"

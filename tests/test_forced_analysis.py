@@ -495,7 +495,7 @@ def test_a_range_beside_the_engine_order_is_noted() -> None:
     wheel = replace(asked.model, sectors=24, engine_order=6, orders={1: 6})
     (note,) = off_engine_order(replace(asked, model=wheel, rpm=8000.0))
     assert (note.level, note.word) == ("trusted", "note")
-    assert note.why.startswith("at 8000 rpm engine order 6 excites at 800 Hz, outside 495 to 512 Hz:")
+    assert note.why.startswith("at 8000 rpm engine order 6 excites at 800 Hz, outside 495 to 512 Hz;")
     assert "passes this range at 4950 to 5120 rpm" in note.remedy
     for other in ({"rpm": 5000.0}, {"rpm": 0.0}, {"rpm": 8000.0, "key": "speed_rpm"}):
         assert off_engine_order(replace(asked, model=wheel, **other)) == ()

@@ -115,7 +115,7 @@ def test_machine_in_series_is_taken_out_where_it_is_given() -> None:
     measured = x + force / machine  # between places with the machine between them
     rigid = ss.contact.fit_loops([(measured, force)])
     assert rigid.k_t == pytest.approx(1 / (1 / K + 1 / machine), rel=1e-9)
-    assert "cannot tell the contact from the machine" in said(rigid)
+    assert "cannot separate the contact from the machine" in said(rigid)
     noise = noisy(force)
     series, own = (ss.contact.fit_loops([(measured, noise)], machine_stiffness=k) for k in (None, machine))
     fit = ss.contact.fit_loops([(measured, force)], machine_stiffness=machine)
@@ -253,7 +253,7 @@ def test_the_command_prints_estimates_and_lines_for_the_study(tmp_path: Path) ->
     assert keys["tangential_stiffness_n_per_m"] == pytest.approx(K, rel=0.02)
     page = (tmp_path / "loops.fit.html").read_text()
     assert "Hysteresis loop and fit" in page
-    assert "cannot tell the contact from the machine" in page
+    assert "cannot separate the contact from the machine" in page
 
 
 def test_without_a_load_the_lines_are_those_of_a_constant_limit(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_named_pipe_as_a_deck_is_refused(tmp_path: Path, suffix: str) -> None:
     [
         ("study.toml", read_study, "is not a file"),
         ("kept.npz", load_structure, "is no file, but a named pipe"),
-        ("result.nc", Result.open, "is no file"),
+        ("result.nc", Result.from_file, "is no file"),
     ],
 )
 def test_a_named_pipe_as_a_study_a_structure_or_a_result_is_refused(

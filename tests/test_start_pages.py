@@ -50,7 +50,7 @@ def test_researcher(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     exec(compile("\n".join(code), "researcher.md", "exec"), names)  # our own page
     said = capsys.readouterr().out
     text = (ROOT / "docs" / "start" / "researcher.md").read_text(encoding="utf-8")
-    hertz, metres = re.search(r"5 +([\d.]+) +([\d.]+) +trusted", said).groups()
+    hertz, metres = re.search(r"5\.0 +([\d.]+) +([\d.e-]+) +trusted", said).groups()
     assert f"{1e3 * float(metres):.2f} mm at {float(hertz):.2f} Hz" in text
     rows = dict(re.findall(r"^(\w+) +(\d+ [\d.]+ mm)$", said, flags=re.MULTILINE))
     assert rows["always_low"].endswith("1.825 mm")

@@ -27,7 +27,7 @@ from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.model.facts import facts_of_part
 from stickslip.model.slow_steps import step
 from stickslip.study.analysis import Advice, Case
-from stickslip.units import HZ
+from stickslip.units import HZ, millimetres
 
 NAMED_POINTS = 4  # open contact points that a line names
 APPROACH_M = 2e-4  # elastic approach of two bodies at rest: pressed metal surfaces approach by micrometres
@@ -154,7 +154,7 @@ def units_in_doubt(question: Question, model: Model) -> Iterator[str]:
     if approach.size and approach.max() > APPROACH_M:
         group = question.model.contacts.groups[int(np.flatnonzero(at)[np.argmax(approach)])]
         yield (
-            f"at rest contact {group} is pressed together by {1e3 * approach.max():.2g} mm, and metal surfaces approach by micrometres. "
+            f"at rest contact {group} is pressed together by {millimetres(approach.max(), 2)}, and metal surfaces approach by micrometres. "
             f"Check the units of its stiffness (N/m) and of the static load (N)."
         )
     mass = {name: facts_of_part(part).mass for name, part in model.parts.items()}
