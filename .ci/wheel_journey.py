@@ -26,7 +26,7 @@ SAME = 1e-6  # of a peak: other versions of NumPy and SciPy round in another ord
 PEAKS = """
 import json, sys
 import stickslip
-result = stickslip.Result.open("results")
+result = stickslip.Result.from_file("results")
 data = result.data["forced_response"]
 own = stickslip.__file__
 assert "site-packages" in own, own

@@ -44,7 +44,7 @@ def main() -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as fresh:
         for example, names in SHOWN.items():
-            result = Result.open(result_of(example, given or Path(fresh)))
+            result = Result.from_file(result_of(example, given or Path(fresh)))
             for name in names:
                 write_figure(result.plot(name), name, PICTURES / f"{example}-{name}.png", "85mm")
                 print(f"{example}: {name}", flush=True)
