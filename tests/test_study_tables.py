@@ -622,6 +622,8 @@ def test_names_of_cases_are_the_shortest_that_tell_them_apart(tmp_path):
     assert labels_of(tmp_path, *doubled) == ["slip limit 3 N", "slip limit 4 N"]
     twice = ["[[vary]]", "contact.brake.slip_limit_n = [3.0]", "[[vary]]", "contact.link.slip_limit_n = [1.0, 2.0]"]
     assert labels_of(tmp_path, *twice)[1] == "brake slip limit 3 N, link slip limit 2 N"
+    close = ["[vary]", "load.shaker.force_n = [1.0000001, 1.0000002, 2.0]"]
+    assert labels_of(tmp_path, *close) == ["force 1.0000001 N", "force 1.0000002 N", "force 2 N"]
 
 
 @pytest.mark.parametrize(

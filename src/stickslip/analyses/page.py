@@ -60,29 +60,31 @@ def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
             yield shown
 
 
-def _answer(shown: Sequence[tuple[Section, xr.Dataset]]) -> Plot | None:
-    """Return the figure at the top of the page: that of the first section, if it is the same for all its cases."""
-    for section, data in shown[:1]:
-        first, *others = _views(section, data)
+Viewed = tuple[Section, xr.Dataset, Sequence[Any]]  # a section, its dataset, and its views
+
+
+def _answer(shown: Sequence[Viewed]) -> Plot | None:
+    """Return the figure at the top of the page, drawn by the first section; None where each of its cases has another one."""
+    for section, _, (first, *others) in shown[:1]:
         parts = section.answer or tuple(part for block in section.blocks for part in block.parts)
         figures = (own for own in _contents(parts, first) if isinstance(own, Plot))
         return None if others else next(figures, None)
     return None
 
 
-def _cards(section: Section, data: xr.Dataset) -> list[Card]:
-    """Return the numbers of a section for the top of the page; those of one case of several name it."""
-    views = _views(section, data)
+def _cards(section: Section, data: xr.Dataset, views: Sequence[Any]) -> list[Card]:
+    """Return the numbers of a section for the top of the page; where each case has others, the first case, by its name."""
     own = section.cards(views[0])
     case = str(data["case_label"].values[0]) if len(views) > 1 else ""
     return [replace(card, note="; ".join(filter(None, (card.note, case)))) for card in own]
 
 
-def _chapter(section: Section, block: Block, data: xr.Dataset, placing: Placing, above: Plot | None) -> Chapter | None:
+def _chapter(viewed: Viewed, block: Block, placing: Placing, above: Plot | None) -> Chapter | None:
     """Return a chapter for all cases, or one for each case with buttons; None for an empty one. The figure `above` is not drawn again."""
+    section, data, views = viewed
     bodies = [
         placing(own for own in _contents(block.parts, view) if above is None or getattr(own, "key", "") != above.key)
-        for view in _views(section, data)
+        for view in views
     ]
     if not any(bodies):
         return None
@@ -138,12 +140,13 @@ def report_html(tree: xr.DataTree) -> str:
     tree
         A result: one node an analysis, provenance in the attributes of the root. Missing parts are left out.
     """
-    placing, nodes, shown = Placing(), _nodes(tree), list(_shown(tree))
+    shown = [(section, data, _views(section, data)) for section, data in _shown(tree)]
+    placing, nodes = Placing(), {section.name: views[0] for section, _, views in shown}
     root = Node(tree.to_dataset())
     above = _answer(shown)
     figure = placing([above] if above else [])
-    cards = [card for section, data in shown for card in _cards(section, data)]
-    each = (_chapter(section, block, data, placing, above) for section, data in shown for block in section.blocks)
+    cards = [card for own in shown for card in _cards(*own)]
+    each = (_chapter(own, block, placing, above) for own in shown for block in own[0].blocks)
     chapters = [chapter for chapter in each if chapter is not None]
     body = placing(_contents((nonlinear_mode.over_responses,), nodes))
     chapters += [Chapter("backbones", "Responses and modes", body)] if body else []

@@ -21,8 +21,6 @@ class ShownCase:
         Position along ``case`` in the dataset.
     label
         Name of the case; empty for a study without [vary].
-    short
-        The name, or the number of a case without one, for legends and columns.
     value
         Value of the first varied key whose values are numbers; NaN without one.
     excitation
@@ -35,11 +33,20 @@ class ShownCase:
 
     index: int
     label: str
-    short: str
     value: float
     excitation: float
     assigned: tuple[str, ...]
     colour: str
+
+    @property
+    def short(self) -> str:
+        """The name, or the number of a case without one, for legends and columns."""
+        return self.label or str(self.index + 1)
+
+    @property
+    def identity(self) -> frozenset[str]:
+        """What tells the same case in another result: varied keys with their values; the name where nothing is varied."""
+        return frozenset(self.assigned or (self.label,))
 
     @property
     def where(self) -> str:
@@ -69,7 +76,6 @@ def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
         ShownCase(
             i,
             labels[i],
-            labels[i] or str(i + 1),
             float(numbers[i]),
             float(force[i]),
             assigned_of(rows[i]),

@@ -74,15 +74,15 @@ class Design:
         except tomllib.TOMLDecodeError:
             return {}
 
-    def case(self, label: str) -> ShownCase | None:
-        """Return the case with a label; None for an unknown one."""
+    def case(self, like: ShownCase) -> ShownCase | None:
+        """Return the case that varies the same keys to the same values as a case of another design; None without one."""
         cases = self.response.cases if self.response else ()
-        return next((c for c in cases if c.label == label), None)
+        return next((c for c in cases if c.identity == like.identity), None)
 
     def held_against(self, case: ShownCase, other: "Design") -> ShownCase | None:
-        """Return the case to compare with a case of another design: the only one, the one with its label, or the one with its varied values."""
+        """Return the case to compare with a case of another design: the only one, the one with its values, or the one with its varied values."""
         cases = self.response.cases if self.response else ()
-        own = self.case(case.label)
+        own = self.case(case)
         if self.response is None or own is not None or len(cases) == 1:
             return own or next(iter(cases), None)
         keys, values = varied_values(self.response.data)

@@ -1,6 +1,6 @@
 """The page of a comparison of designs: peaks, responses, optimisation curves, inputs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,18 +58,24 @@ def over_first(value: float, first: float) -> float:
 
 def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
     """Return the choices of the reader: the best case of each design, then each case of any design; none if each design has one case."""
-    labels = dict.fromkeys(
-        c.label for d in designs if d.response and len(d.response.cases) > 1 for c in d.response.cases
-    )
-    names = [_BEST, *labels] if labels else []
-    return tuple(ShownCase(i, name, name, float("nan"), float("nan"), (), MUTED) for i, name in enumerate(names))
+    every = _every_case([d.response for d in designs if d.response and len(d.response.cases) > 1])
+    names = [(_BEST, ()), *((c.label, c.assigned) for c in every)] if every else []
+    return tuple(ShownCase(i, name, float("nan"), float("nan"), own, MUTED) for i, (name, own) in enumerate(names))
+
+
+def _every_case(responses: Iterable[Response]) -> list[ShownCase]:
+    """Return the cases of all responses, one that several have once."""
+    found: dict[frozenset[str], ShownCase] = {}
+    for case in (c for response in responses for c in response.cases):
+        found.setdefault(case.identity, case)
+    return list(found.values())
 
 
 def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | None:
     cases = design.response.cases if design.response else ()
     if choice.index == 0:
         return design.best(divided=divided)
-    return cases[0] if len(cases) == 1 else design.case(choice.label)
+    return cases[0] if len(cases) == 1 else design.case(choice)
 
 
 def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool) -> ShownCase | None:
@@ -80,7 +86,7 @@ def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided:
     told = [d for d in designs if d.response is not None]
     common = [c for c in offered[1:] if all(_case(d, c, divided=divided) for d in told)]
     best = told[0].best(divided=divided) if told else None
-    of_first = [c for c in common if best is not None and c.label == best.label]
+    of_first = [c for c in common if best is not None and c.identity == best.identity]
     return next(iter([*of_first, *common, *offered]), None)
 
 
@@ -227,19 +233,18 @@ class PeakRow:
 def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
     """Return one row for each case of each design, in the order of cases."""
     told = [(d, d.response) for d in designs if d.response is not None]
-    labels = dict.fromkeys(c.label for _, r in told for c in r.cases)
     found = []
-    for label in labels:
+    for like_case in _every_case(r for _, r in told):
         for design, response in told:
-            case, (first, of_first) = design.case(label), told[0]
+            case, (first, of_first) = design.case(like_case), told[0]
             if case is None:
                 continue
             height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
             like, off, shift = first.held_against(case, design), float("nan"), float("nan")
-            if design is not first and like is not None:
+            if design is not first and like is not None and _same_load(case.excitation, like.excitation):
                 off = over_first(height, _peak(of_first, like, divided=divided))
                 shift = hz - of_first.peak_hz(like)
-            found.append(PeakRow(label, design.name, hz, height, response.level(case), off, shift))
+            found.append(PeakRow(like_case.label, design.name, hz, height, response.level(case), off, shift))
     return found
 
 
@@ -357,7 +362,7 @@ def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
     if shown is None or shown.index == 0:
         return found
     alike = [(d, _case(d, shown, divided=divided)) for d in designs]
-    if [c and c.label for _, c in alike] == [c and c.label for _, c in best]:
+    if [c and c.identity for _, c in alike] == [c and c.identity for _, c in best]:
         return found
     return [*found, *_held(alike, f"peak of {{}} at {shown.label}", unit, divided=divided)]
 

@@ -131,7 +131,7 @@ def _line_look(trace: Any, mode: str, *, with_markers: bool) -> dict[str, Any]:
 
 
 def _dots(panel: Panel, trace: Any, x: Any, y: Any) -> Any:
-    """Draw markers of which each has its own colour, size or symbol; return those of the first symbol."""
+    """Draw markers, each in its own colour, size and symbol; return the markers with the first symbol."""
     n, marker = len(x), trace.marker
     given = marker.symbol
     symbols = np.array(list(given)[:n] if isinstance(given, list | tuple | np.ndarray) else [given or "circle"] * n)
