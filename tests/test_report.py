@@ -225,6 +225,22 @@ def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
     assert 20 < first["words"] <= 90, first["all"]
 
 
+@needs_browser
+@pytest.mark.parametrize(("width", "beside"), [(400, False), (760, False), (1200, True)])
+def test_a_legend_stands_below_its_panel_on_a_narrow_screen(
+    browser: Browser, page: Path, width: int, beside: bool
+) -> None:
+    browser.width(width)
+    browser.open(page)
+    browser.until("document.querySelector('#plot-response .legend')")
+    legend, panel = (
+        browser.run(f"document.querySelector('#plot-response {part}').getBoundingClientRect().toJSON()")
+        for part in (".legend", ".nsewdrag")
+    )
+    assert (legend["left"] >= panel["right"]) is beside
+    assert (legend["top"] >= panel["bottom"]) is not beside
+
+
 def test_page_is_one_small_file_without_network(page: Path) -> None:
     html = page.read_text(encoding="utf-8")
     assert page.stat().st_size < 6.4e6

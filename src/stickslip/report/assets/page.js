@@ -10,7 +10,7 @@ document.querySelectorAll(".chooser button").forEach(button => button.addEventLi
 }));
 // on a narrow screen a legend beside the panel would leave it half the width
 if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
-  const legend = plot.layout.legend || {};
+  const legend = (plot._fullLayout || {}).legend || {}; // what a template says stands nowhere else
   if (plot.closest(".panels") || !(legend.x > 1)) return;
   Plotly.relayout(plot, {"legend.orientation": "h", "legend.x": 0, "legend.y": -0.16, "legend.yanchor": "top"});
 });
