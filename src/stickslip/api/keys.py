@@ -44,6 +44,8 @@ class HarmonicsKeys(TypedDict, total=False):
     """threshold of a selection whose indicator is no error, greater than zero; left out: as in its source"""
     per_dof: bool
     """harmonics chosen for each retained coordinate by itself, as in the sources (for maple and grolet); default False"""
+    similarity: bool
+    """true: at every point of [forced_response] the Jacobians with the first and with the most harmonics are compared (ΔJ and Γ of Gastaldi and Berruti), and their blocks between harmonics stored at the peak; up to 2000 unknowns; default False"""
     repeats: bool
     """solve a frequency again until it has the harmonics predicted for it (for grolet, laxalde, suess_spectral and suess_jacobian); default False"""
     alert_harmonics: Sequence[int] | IntArray | None

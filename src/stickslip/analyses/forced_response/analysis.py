@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.advice import advice, of_pressures
+from stickslip.analyses.forced_response.jacobians import of_jacobians
 from stickslip.analyses.forced_response.more_harmonics import check_harmonics
 from stickslip.analyses.forced_response.physics.known import known
 from stickslip.analyses.forced_response.physics.limits import PHYSICS, motion_at_peak, of_physics
@@ -70,6 +71,7 @@ NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
 BLADES = "blades"  # of a wheel whose sectors differ
 BIFURCATIONS = "bifurcations"
+JACOBIANS = "jacobians"
 NOT_PERIODIC = "not_periodic"
 NOTES = (
     "model",
@@ -80,6 +82,7 @@ NOTES = (
     IN_TIME,
     NOT_PERIODIC,
     HARMONICS,
+    JACOBIANS,
     PHYSICS,
 )  # what makes up the dataset
 
@@ -113,8 +116,7 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
     told = _judge(inputs, response, examined, notes)
     if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
         notes.put(BIFURCATIONS, _bifurcations(inputs, response, told, notes))
-    if HARMONICS in inputs.checks:
-        _check_harmonics(inputs, response, notes)
+    _check_harmonics(inputs, response, notes)
     if notes.get(PHYSICS) is None:
         notes.put(PHYSICS, _of_physics(inputs, response))
     if failure is not None:
@@ -227,9 +229,13 @@ def _bifurcations(question: Question, response: Response, examined: Sequence[Exa
 
 
 def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:
-    doubt = check_harmonics(question, response)
-    LOG.info(f"more harmonics: {question.said(doubt.sentence)}")
-    notes.put(HARMONICS, of_doubt(doubt))
+    """Predict the change by more harmonics, and compare Jacobians, where that is asked for."""
+    if HARMONICS in question.checks:
+        doubt = check_harmonics(question, response)
+        LOG.info(f"more harmonics: {question.said(doubt.sentence)}")
+        notes.put(HARMONICS, of_doubt(doubt))
+    if question.similarity and notes.get(JACOBIANS) is None:
+        notes.put(JACOBIANS, of_jacobians(question, response))
 
 
 def _compile(question: Question) -> None:

@@ -128,6 +128,7 @@ STABLE = "stability"  # what every run finds out unless the study says no
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
 ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
+MAX_COMPARED_ROWS = 2000  # of dense Jacobians: some seconds a point
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
 
@@ -168,6 +169,8 @@ class Question:
         Model and load with 50 % more modes; None if there are no more modes, or the check is off.
     extent
         Size and stiffness of its bodies; None if the check is off.
+    similarity
+        Whether Jacobians with few and with many harmonics are compared at every point.
     """
 
     label: str
@@ -185,6 +188,7 @@ class Question:
     rpm: float = 0.0
     richer: tuple[System, HarmonicLoad] | None = None
     extent: Extent | None = None
+    similarity: bool = False
 
     @property
     def over_speed(self) -> bool:
@@ -276,7 +280,7 @@ def question_of(case: Case, model: Model) -> Question:
     if IN_TIME in case.checks:
         refuse_whole("--verify", model, "run without --verify")
         _require_integrable(model)
-    _refuse_for_rigid(model, sweep, case.checks)
+    _refuse_for_rigid(model, sweep, case.checks, settings.harmonics.similarity)
     check_limits(settings.limits, estimate(model, sweep))
     # solutions are judged towards up to three times the harmonics that are kept
     harmonics = JUDGED_MULTIPLE * sweep.high_harmonics[-1]
@@ -292,6 +296,8 @@ def question_of(case: Case, model: Model) -> Question:
     if (share := settings.forced_response.static_friction_share) is not None:
         assembled = _with_frozen_sliders(assembled, share)
     _require_coefficients(assembled, sweep)
+    if settings.harmonics.similarity:
+        _require_comparable(assembled, sweep)
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
@@ -314,6 +320,7 @@ def question_of(case: Case, model: Model) -> Question:
         ),
         not_periodic_points=settings.forced_response.not_periodic_points,
         rpm=model.speed / RPM,
+        similarity=settings.harmonics.similarity,
     )
 
 
@@ -327,6 +334,24 @@ def _require_coefficients(model: Assembled, sweep: Sweep) -> None:
     low, high = sweep.omega_range
     what = f"a response with harmonics up to {most}"
     force.influence.require(min(h for h in first if h) * low, most * high, what)
+
+
+def _require_comparable(model: Assembled, sweep: Sweep) -> None:
+    """Refuse a comparison of Jacobians with equal harmonics, or of more rows than dense matrices should have."""
+    few, many = sweep.low_harmonics, sweep.supports[:2][-1] if sweep.auto else sweep.high_harmonics
+    if few == many:
+        raise input_error(
+            "harmonics.similarity",
+            f"compares Jacobians with few and with many harmonics, and low and high are both {named(few)}",
+            'Give high = "auto" or a higher harmonic, or a lower low.',
+        )
+    rows = (2 * len(many) - 1) * model.system.retained.size
+    if rows > MAX_COMPARED_ROWS:
+        raise input_error(
+            "harmonics.similarity",
+            f"compares dense matrices of up to {MAX_COMPARED_ROWS} rows, and H = {named(many)} has {rows}",
+            "Remove it, lower harmonics.high, or give the contacts fewer points.",
+        )
 
 
 def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
@@ -402,7 +427,7 @@ def _require_sectors(model: Model, assembled: Assembled) -> None:
         )
 
 
-def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> None:
+def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str], similarity: bool) -> None:
     """Refuse features that need contact forces as functions of the gaps, in a model with rigid contacts."""
     found = [name for name, contact in model.contacts.items() if law_name(contact.law) == RIGID]
     if not found:
@@ -421,6 +446,12 @@ def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> Non
                 f"leaves harmonics out, got {named(own)}, {because}",
                 f"Give {own[-1]}: all harmonics up to it.",
             )
+    if similarity:
+        raise input_error(
+            "harmonics.similarity",
+            f"compares derivatives of contact forces, {because}",
+            "Remove it, or give the contact a law with stiffnesses, such as elastic_coulomb.",
+        )
     if HARMONICS in checks:
         raise input_error(
             f"contact.{found[0]}.law",

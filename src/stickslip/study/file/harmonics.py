@@ -63,6 +63,11 @@ class Harmonics(Section):
         False,
         description="harmonics chosen for each retained coordinate by itself, as in the sources (for maple and grolet)",
     )
+    similarity: bool = Field(
+        False,
+        description="true: at every point of [forced_response] the Jacobians with the first and with the most harmonics are compared (ΔJ and Γ of "
+        "Gastaldi and Berruti), and their blocks between harmonics stored at the peak; up to 2000 unknowns",
+    )
     repeats: bool = Field(
         False,
         description="solve a frequency again until it has the harmonics predicted for it (for grolet, laxalde, suess_spectral and suess_jacobian)",

@@ -21,6 +21,7 @@ from stickslip.analyses.forced_response.page.contacts import (
 from stickslip.analyses.forced_response.page.curves import frequency_response, low_order, of_each_order
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
 from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
+from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
 from stickslip.analyses.forced_response.page.optimisation import optimisation, what_is_needed, where_friction_works
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.forced_response.page.wheel import (
@@ -264,7 +265,17 @@ SECTION: Section = Section(
         Block(
             "harmonics",
             "Harmonics: where more were needed, and what they cost",
-            (choice, kept_harmonics, errors, error_scatter, low_order, more_harmonics, attempts),
+            (
+                choice,
+                kept_harmonics,
+                errors,
+                error_scatter,
+                low_order,
+                more_harmonics,
+                jacobian_change,
+                jacobian_blocks,
+                attempts,
+            ),
             folded=True,
         ),
     ),

@@ -421,6 +421,40 @@ class MoreHarmonics:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Jacobians:
+    """Jacobians with few and with many harmonics (``harmonics.similarity``; Gastaldi and Berruti 2017, sections 4.1 and 6.2)."""
+
+    jacobian_reference: int = column("1", "highest harmonic of the compared Jacobians", along="case")
+    jacobian_rows: int = column("1", "rows of the compared Jacobians", along="case")
+    neglected_frequency_hz: float = column(
+        "Hz", "frequency of neglected_block_norm, where jacobian_change_percent is largest", along="case"
+    )
+    jacobian_change_percent: FloatArray = column(
+        "percent",
+        "ΔJ%: Frobenius norm of the difference of the Jacobians at the solutions with few and with many harmonics, over that with many (eq. 30); NaN where one solution is not found",
+        along="point",
+    )
+    gamma_mean_diagonal: FloatArray = column(
+        "1",
+        "mean of the diagonal of Γ (eq. 31), 1 for equal Jacobians; times jacobian_rows it is the trace",
+        along="point",
+    )
+    gamma_zero_percent: FloatArray = column(
+        "percent", "share of the terms of Γ off its diagonal of at most 0.001", along="point"
+    )
+    jacobian_block_norm: FloatArray = column(
+        "1",
+        "largest singular value of each block of the Jacobian at the peak, with few harmonics; 1 is as stiff as structure and stuck contact of a coordinate",
+        along="case force_harmonic motion_harmonic",
+    )
+    neglected_block_norm: FloatArray = column(
+        "1",
+        "the same of ΔJ (eq. 20), the blocks that few harmonics neglect, at neglected_frequency_hz",
+        along="case force_harmonic motion_harmonic",
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PhysicsVerdicts:
     """Verdicts on the physics of a case, which need the model."""
 
@@ -542,6 +576,7 @@ KINDS = (
     SidePoints,
     TimeChecks,
     MoreHarmonics,
+    Jacobians,
     PhysicsVerdicts,
     MotionAtPeak,
     ModelChanges,

@@ -16,7 +16,13 @@ from stickslip.study.verdict import said
 
 LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
 SOME = OWNERS.keys() - {"point", "attempt", "alert_point"}  # dimensions of what some cases may lack
-COUNTED = ("harmonic", "sample", "mode")  # dimensions that may be longer in one case than in another
+COUNTED = (
+    "harmonic",
+    "force_harmonic",
+    "motion_harmonic",
+    "sample",
+    "mode",
+)  # dimensions that may be longer in one case than in another
 AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
 
 
