@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from models import lifting, table
+from newton_bounds import allowed, answer_at
 from pydantic import ValidationError
 from small_v2 import write_four_masses
 from synthetic_result import tree_of
@@ -42,11 +43,14 @@ from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.problem import forced_point
 from stickslip.response.forced.response import ForcedPoint, Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.recovery import damped_share, equivalent_damping, fields
 from stickslip.response.system import System
-from stickslip.solve.newton_method import GLOBALISATIONS, Newton
-from stickslip.solve.status import Status
+from stickslip.solve.iterate import Iterate, Work
+from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, newton
+from stickslip.solve.status import Rung, Status
 from stickslip.study.analysis import Case, Solved
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.models.study import read_study
@@ -643,18 +647,43 @@ def test_a_first_run_says_how_long_it_compiled(
     assert said[0].startswith("compiled the contact laws in ")
 
 
-def test_each_globalisation_gives_the_same_response(tmp_path: Path) -> None:
-    keys = {"forced_response.frequencies": "5", "forced_response.peak_points": "0", "harmonics.high": "3"}
-    found = {}
+class FullSteps:
+    """Newton's method without a globalisation."""
+
+    def advance(self, work: Work, now: Iterate) -> Iterate | Status:
+        step = work.newton_step(now)
+        return Status.SINGULAR if step is None else work.at(now.x + step)
+
+
+def test_each_globalisation_acts_where_full_newton_steps_fail(tmp_path: Path) -> None:
+    """One frequency without neighbours: the key decides the way there, its number of steps, and not the solution."""
+    listed = {"forced_response.frequencies_hz": "[13.5]", "forced_response.peak_points": "0"}
+    keys = listed | {"harmonics.high": "5", "harmonics.selection": '"always_high"', "solver.rescue": '"off"'}
+    found: dict[str, xr.Dataset] = {}
     for name in GLOBALISATIONS:
-        own = keys | {"solver.globalisation": f'"{name}"', "vary.load.shaker.force_n": "[3.0]"}
-        study = read_study(write_four_masses(tmp_path / name, own))
-        assert sweep_of(study.cases()[0].settings, None).newton.globalisation == name
-        outcome = run_study(study)
-        assert outcome.failed == 0
-        found[name] = outcome.tree["forced_response"].to_dataset()
-    first = found["line_search"]
+        path = write_four_masses(
+            tmp_path / name, keys | {"solver.globalisation": f'"{name}"', "load.shaker.force_n": "3.0"}
+        )
+        path.write_text(path.read_text().replace("frequency_hz = [8.0, 16.0]\n", ""))
+        study = read_study(path)
+        found[name] = run_study(study).tree["forced_response"].to_dataset()
+        assert found[name].attempt_status.values.tolist() == [int(Status.CONVERGED)]
+    question = FORCED_RESPONSE.inputs(study.cases()[0], study.cases()[0].build())
+    problem, omega = question.problem, 2 * np.pi * 13.5
+    start = bonded_start(problem.low, omega, question.model.system)
+
+    def corrected(options: Newton, other: FullSteps | None = None) -> Solution:
+        return newton(lambda x: problem.low.linearise(x, omega), start, options, other)
+
+    full = corrected(Newton(max_iterations=200), FullSteps())
+    assert full.status == Status.TOO_MANY_ITERATIONS  # the contacts switch to and fro for ever
+    ways = {name: corrected(Newton(globalisation=name)) for name in GLOBALISATIONS}
+    assert all(way.rung == Rung.DAMPED_STEP for way in ways.values())  # each refused a full step
+    counts = {name: way.iterations for name, way in ways.items()}
+    assert len(set(counts.values())) == len(counts), counts
+    assert {name: int(data.attempt_newton_iterations[0]) for name, data in found.items()} == counts
+    point = forced_point(problem.low, ways["line_search"], "low", 0, omega, 0.0)
+    answer = answer_at(problem, point)
     for data in found.values():
-        np.testing.assert_array_equal(data.frequency_hz, first.frequency_hz)
-        # each ends where the scaled residual is below 1e-10; the condition of these equations is below 1e4
-        np.testing.assert_allclose(data.amplitude, first.amplitude, rtol=1e-6)
+        motion = data.output_displacement.values[0, ..., 0] + 1j * data.output_displacement.values[0, ..., 1]
+        assert np.abs(motion - answer.outputs).max() <= allowed("outputs", answer, answer)
