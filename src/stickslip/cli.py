@@ -50,6 +50,13 @@ OtherMachines = Annotated[
 Share = Annotated[
     str | None, typer.Option(metavar="I/N", help="Do one share of the jobs; the last share to end joins the results.")
 ]
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help='Import and run modules that the file names (selection = "my_module:Mine"). Only for files that you trust.',
+    ),
+]
 
 
 def main() -> None:
@@ -96,6 +103,7 @@ def run(
         Path | None, typer.Option(metavar="DIR", help="Folder of the results; by default beside the study.")
     ] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
+    allow_code: AllowCode = False,
     verbose: Annotated[
         bool,
         typer.Option("--verbose", "-v", help="Show progress of every point and check, and every verdict."),
@@ -104,7 +112,7 @@ def run(
     """Run the analyses of a study; an interrupted run continues where it stopped."""
     with _errors_as_text():
         with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
-            content = read(study)
+            content = read(study, allow_code=allow_code)
             from stickslip.api.study import answers
 
             outcome = answers(
@@ -136,11 +144,11 @@ def run(
 
 
 @app.command()
-def check(study: StudyFile) -> None:
+def check(study: StudyFile, *, allow_code: AllowCode = False) -> None:
     """Prepare a study without solving it: read, mesh, reduce, static state, natural frequencies."""
     with _errors_as_text():
         with on_screen(Screen(console())):
-            doubts = read(study, say).check()
+            doubts = read(study, say, allow_code=allow_code).check()
         say(f"{study}: good to run{f', {len(doubts)} doubtful' * bool(doubts)}")
 
 

@@ -18,11 +18,13 @@ from stickslip.study.exchange.vtu import write_vtu
 from stickslip.study.file.study import StudyFile, validated
 from stickslip.study.file.toml import parsed
 from stickslip.study.models.study import Study
+from stickslip.study.own_code import OwnCode
 from stickslip.study.store.atomic_write import unwritable
 from stickslip.study.store.progress import LOG
 
 Format = Literal["vtu", "frd", "uff"]
 MOST_STEPS = 1000
+IN_PYTHON = "A result imports no code. In Python: result.export(of=Study.from_file(path, allow_code=True).model())."
 
 
 @dataclass(frozen=True)
@@ -105,4 +107,4 @@ def _model(tree: xr.DataTree, path: Path | None, home: Path | None, case: int) -
             raise input_error("export", "the result does not lie where its study put it", remedy)
         home = Path(*last[: -len(inner.parts)])
     place = home / "study.toml"
-    return Study(StudyFile(place, text, raw, validated(place, raw))).model(case)
+    return Study(StudyFile(place, text, raw, validated(place, raw, OwnCode(home, remedy=IN_PYTHON)))).model(case)

@@ -35,7 +35,7 @@ class HarmonicsKeys(TypedDict, total=False):
         ]
         | Strategy
     )
-    """what chooses the harmonics of a frequency: jacobian_alert, guarded_alert, goal_oriented, grolet, jaumouille, laxalde, maple, suess_jacobian, suess_spectral, always_low, always_high; default 'guarded_alert'"""
+    """what chooses the harmonics of a frequency: jacobian_alert, guarded_alert, goal_oriented, grolet, jaumouille, laxalde, maple, suess_jacobian, suess_spectral, always_low, always_high; or my_module:Name, a strategy of your own, with --allow-code; default 'guarded_alert'"""
     passages: Literal["double", "single"]
     """double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency before the next one, as selections that predict the next frequency always do; default 'double'"""
     alert_threshold_percent: float

@@ -135,7 +135,14 @@ def unforeseen(error: BaseException) -> str:
         return printable(
             f"{place}: cannot be used ({error.strerror or said}). Look after it and run the same command again."
         )
+    from stickslip.study.own_code import line_of
+
     where, name = _origin(error), type(error).__name__
+    if (own := line_of(error)) is not None:
+        return printable(
+            f"{own}: {name}: {said}. Correct your code, and run the same command again. "
+            f"{TRACEBACK}=1 in the environment shows the calls."
+        )
     return printable(
         f"stickslip: {name}: {said} ({where}). This is a fault of stickslip: please report it. "
         f"{TRACEBACK}=1 in the environment shows where it comes from."

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from stickslip.api.study import Study
 
 
-def read(path: Path, tell: Callable[[str], None] | None = None) -> "Study":
+def read(path: Path, tell: Callable[[str], None] | None = None, *, allow_code: bool = False) -> "Study":
     """Read a study file for the command line, and set BLAS to one thread unless the user chose a number.
 
     Parameters
@@ -17,6 +17,8 @@ def read(path: Path, tell: Callable[[str], None] | None = None) -> "Study":
         The study file.
     tell
         What is given the line on size and time of a check, before heavy libraries are imported.
+    allow_code
+        Whether the file may name modules of the user.
 
     Raises
     ------
@@ -30,7 +32,7 @@ def read(path: Path, tell: Callable[[str], None] | None = None) -> "Study":
     read_toml(path)
     from stickslip.study.file.study import read_file
 
-    file = read_file(path)
+    file = read_file(path, allow_code=allow_code)
     from stickslip.study.models.checks import refuse
 
     refuse(file)

@@ -47,15 +47,22 @@ class Study:
     content: Content
 
     @classmethod
-    def from_file(cls, path: str | Path) -> "Study":
+    def from_file(cls, path: str | Path, *, allow_code: bool = False) -> "Study":
         """Read a study file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        allow_code
+            Whether it may name modules of yours, ``selection = "my_module:Mine"``: they are imported and run.
 
         Raises
         ------
         InputError
             Naming every problem of the file, one a line.
         """
-        return cls(read_study(Path(path)))
+        return cls(read_study(Path(path), allow_code=allow_code))
 
     @property
     def folder(self) -> Path:

@@ -10,9 +10,11 @@ from typing import Any
 
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
 from stickslip.contact.cache import njit
+from stickslip.errors import input_error
 
 _vector = types.float64[::1]
 STEP_SIGNATURE = types.void(
@@ -56,8 +58,21 @@ def law_address(kernel: Any) -> int:
 
 
 def compiled_step(step: Callable[..., None]) -> Any:
-    """Compile the step of a law, see `contact.law.law_kernel`."""
+    """Compile the step of a law, see `contact.law.law_kernel`.
+
+    Raises
+    ------
+    InputError
+        If numba cannot compile it.
+    """
     try:
         return njit(STEP_SIGNATURE, cache=True)(step)
+    except NumbaError as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        raise input_error(
+            f"{step.__module__}.{step.__qualname__}",
+            f"is no step that numba compiles: {'; '.join(lines[1:5])}",
+            "Use numbers, loops and arrays alone; 'A contact law' of docs/extending.md has the arguments.",
+        ) from error
     except RuntimeError:  # numba finds no place for the cache of code without a file
         return njit(STEP_SIGNATURE)(step)

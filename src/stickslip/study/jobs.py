@@ -16,6 +16,7 @@ import numpy as np
 from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analysis import Analysis, Job
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
+from stickslip.study.own_code import Shipped
 from stickslip.study.store.attempts import (
     begin,
     clear,
@@ -54,6 +55,8 @@ class Order:
         Limits on time and memory.
     owner
         Owner of the file at work; empty: no other process may write it.
+    code
+        Code of the user that the job needs; None for none.
     """
 
     analysis: Analysis
@@ -62,6 +65,7 @@ class Order:
     checks: frozenset[str] = frozenset()
     limits: Limits = field(default_factory=Limits)
     owner: str = ""
+    code: Shipped | None = None
 
     @property
     def file(self) -> Path:
@@ -72,7 +76,7 @@ class Order:
         """Return the job pickled for a worker."""
         question = self.analysis.name.replace("_", " ")
         told = (self.sealed, self.job.label, question, self.limits, owner or self.owner)
-        return Parcel(pickle.dumps((solve, self)), *told)
+        return Parcel(pickle.dumps((solve, self)), *told, self.code)
 
 
 @dataclass

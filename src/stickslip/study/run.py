@@ -22,10 +22,11 @@ from stickslip.study.analysis import Analysis, Case, Job, Solved, named
 from stickslip.study.jobs import Order, solve_job, worked
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
+from stickslip.study.own_code import CODE_FILE, OwnCode, Shipped
 from stickslip.study.questions import ANALYSES
 from stickslip.study.shard import Shard
 from stickslip.study.store.archive import PartStore
-from stickslip.study.store.atomic_write import whole_file
+from stickslip.study.store.atomic_write import whole_file, write_whole
 from stickslip.study.store.attempts import file_at_work, new_owner
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
 from stickslip.study.store.journal import SEALED, JobJournal, read_sealed
@@ -160,7 +161,9 @@ def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mappi
 
 
 def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]) -> Outcome:
-    origin = Provenance(study.title, study.text, library_versions(), study_file=as_text(study.path.name))
+    code = study.file.code
+    versions = library_versions() | code.files
+    origin = Provenance(study.title, study.text, versions, study_file=as_text(study.path.name))
     book = Book(origin, measured=study.measured)
     store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
@@ -183,6 +186,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
         meshes = _meshes(t.case for t in to_do)
         if fresh:
             empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
+        _tell_of_code(code, study.folder / CODE_FILE)
         for name, mesh in meshes.items():
             files.append(study.folder / f"{name}.vtu")
             with whole_file(files[-1]) as temporary:
@@ -204,6 +208,21 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
     return replace(outcome, files=(target, *files, place.log(study.folder)))
+
+
+def _tell_of_code(code: OwnCode, kept: Path) -> None:
+    """Log which code of the user runs, and which of it has changed since the last run in the folder."""
+    try:
+        before = dict(json.loads(kept.read_bytes()))
+    except (OSError, ValueError, TypeError):  # there is none, or it is damaged
+        before = {}
+    if not code.files and not before:
+        return
+    for name, now in code.files.items():
+        LOG.info(f"own code: {name}, SHA-256 {now}")
+        if before.get(name, now) != now:
+            LOG.info(f"{name} has changed since the last run here: nothing of that run is used")
+    write_whole(kept, json.dumps(code.files).encode())
 
 
 def _refuse_result_of_another(study: Study) -> None:
@@ -251,7 +270,9 @@ def _order(study: Study, task: Task, place: Place) -> Order:
     """Return the job of a task for a worker."""
     job = Job(_label(task.analysis, task.case), _inputs(study, task))
     owner = "" if place.shard is None else new_owner()
-    return Order(task.analysis, job, task.sealed, task.case.checks, _limits(task), owner)
+    own = study.file.code
+    code = Shipped(own.home, own.files) if own.files else None
+    return Order(task.analysis, job, task.sealed, task.case.checks, _limits(task), owner, code)
 
 
 def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]:

@@ -303,6 +303,13 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts
 
 def _one_of(ways: Mapping[str, Any]) -> Reduction:
     """Return the reduction of all parts together: numbers of modes add up, anything else must be alike."""
+    for name, way in ways.items():
+        if not isinstance(way, Reduction):
+            raise input_error(
+                f"part.{name}.reduction",
+                f"is a {type(way).__name__}, and the waves of a wheel are reduced by craig_bampton or rubin",
+                "Choose one of them, or reduce the sector before it becomes a part.",
+            )
     (first, one), *others = ways.items()
     total = one.n_modes
     for name, other in others:

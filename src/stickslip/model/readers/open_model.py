@@ -111,6 +111,16 @@ def read_structure(place: str, path: Path, **settings: Any) -> Structure:
     )
 
 
+def refuse_other_models(place: str, reader: str, found: object) -> None:
+    """Refuse what a reader of the user returns if it is neither a structure nor a mesh."""
+    if not isinstance(found, Structure | SolidMesh):
+        raise input_error(
+            place,
+            f"{reader} returns a {type(found).__name__}",
+            "Return a stickslip.Structure or a stickslip.model.SolidMesh, in SI.",
+        )
+
+
 def _path(name: Path | str | None) -> Path | None:
     return None if name is None else Path(name)
 

@@ -11,19 +11,25 @@ from stickslip.harmonic.harmonic_set import Harmonics as Support
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
+from stickslip.study.file.own import own_object
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
+from stickslip.study.own_code import is_address, made, of_address
 
 HIGHEST = 200  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
 SAMPLES_A_HARMONIC = 8  # of a period, at least
+MEMBERS = ("judge", "threshold", "verifies")  # of a strategy
 PLACES = ("answer", "along", "outputs", "contacts")
 
 Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
 Kept = Harmonic | list[Harmonic]
 
 
-def _named_or_own(given: Any, check: Callable[[Any], Any]) -> Any:
-    """Return a strategy that Python gives as it is; a name is checked."""
+def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
+    """Return a strategy that Python gives as it is; names and module paths are checked."""
+    if is_address(given):
+        own_object(info, given, "strategy", MEMBERS, instance=True)
+        return given
     return given if hasattr(given, "judge") else check(given)
 
 
@@ -43,7 +49,8 @@ class Harmonics(Section):
     )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     selection: Selection = Field(
-        SELECTION, description="what chooses the harmonics of a frequency: " + ", ".join(SELECTIONS)
+        SELECTION,
+        description=f"what chooses the harmonics of a frequency: {', '.join(SELECTIONS)}; or my_module:Name, a strategy of your own, with --allow-code",
     )
     passages: Passages = Field(
         "double",
@@ -133,10 +140,17 @@ class Harmonics(Section):
         return harmonics_of(self.high)
 
     @property
+    def own_strategy(self) -> Any:
+        """The strategy of the user; None for a built-in one."""
+        if is_address(self.selection):
+            return made(of_address(self.selection), self.selection)
+        return None if isinstance(self.selection, str) else self.selection
+
+    @property
     def strategy(self) -> Any:
         """The strategy that chooses harmonics, with the threshold of this table if it has one."""
-        if not isinstance(self.selection, str):
-            return self.selection
+        if self.own_strategy is not None:
+            return self.own_strategy
         from stickslip.harmonic.selection import strategy_named  # loads the contact kernels
 
         verifies = self.selection in VERIFYING
@@ -150,7 +164,7 @@ class Harmonics(Section):
     @property
     def chooser(self) -> Any:
         """Argument `selection` of a sweep: the name of a strategy, or the strategy with the threshold of this table."""
-        as_named = isinstance(self.selection, str) and self.strategy_threshold is None and not self._options
+        as_named = self.own_strategy is None and self.strategy_threshold is None and not self._options
         return self.selection if as_named else self.strategy
 
 
@@ -213,8 +227,8 @@ def _of_options(table: Harmonics) -> Iterator[PydanticCustomError]:
 
 def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
     given = {"alert_threshold_percent", "strategy_threshold"} & table.model_fields_set
-    if not isinstance(table.selection, str):
-        name = type(table.selection).__name__
+    if table.own_strategy is not None:
+        name = type(table.own_strategy).__name__
         yield from (
             custom_error(f"has no meaning for the strategy {name}", f"Give {name} its own threshold.", key)
             for key in sorted(given - {"alert_threshold_percent"} if table.high == "auto" else given)

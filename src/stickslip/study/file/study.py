@@ -1,7 +1,7 @@
 """The study file: TOML, validated as a whole for each case of [vary]."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from stickslip.study.file.messages import told
 from stickslip.study.file.tables import VERSION, Tables, study_tables
 from stickslip.study.file.toml import read_toml
 from stickslip.study.file.vary import VariedCase, cases_of, with_values
+from stickslip.study.own_code import OwnCode
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +48,15 @@ class StudyFile:
         Content of the file as parsed TOML.
     cases
         Cases of [vary]; one case without it.
+    code
+        Code of the user that the file names.
     """
 
     path: Path
     text: str
     raw: Mapping[str, Any]
     cases: tuple[TablesOfCase, ...]
+    code: OwnCode = field(default_factory=OwnCode)
 
     @property
     def tables(self) -> Tables:
@@ -65,8 +69,8 @@ class StudyFile:
         return self.path.resolve().parent
 
 
-def read_file(path: Path) -> StudyFile:
-    """Read and validate a study file.
+def read_file(path: Path, *, allow_code: bool = False) -> StudyFile:
+    """Read and validate a study file; `allow_code`: it may name modules of the user, which are imported.
 
     Raises
     ------
@@ -74,11 +78,12 @@ def read_file(path: Path) -> StudyFile:
         Naming every problem of the file, one a line.
     """
     text, raw = read_toml(path)
-    return StudyFile(path, text, raw, validated(path, raw))
+    code = OwnCode(path.resolve().parent, allow_code)
+    return StudyFile(path, text, raw, validated(path, raw, code), code)
 
 
-def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
-    """Return the tables of each case of a file's content.
+def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[TablesOfCase, ...]:
+    """Return the tables of each case of a file's content, which may name `code` of the user.
 
     Raises
     ------
@@ -91,7 +96,7 @@ def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
     errors: dict[str, InputError] = {}
     for case in cases_of(str(path), raw, model):
         try:
-            found.append(_case(path, raw, case))
+            found.append(_case(path, raw, case, code))
         except InputError as error:  # what is wrong in many cases is told once
             errors |= {str(one): one for one in error.each()}
     if errors:
@@ -99,10 +104,10 @@ def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
     return tuple(found)
 
 
-def _case(path: Path, raw: Mapping[str, Any], case: VariedCase) -> TablesOfCase:
+def _case(path: Path, raw: Mapping[str, Any], case: VariedCase, code: OwnCode) -> TablesOfCase:
     model = study_tables()
     try:
-        tables = model.model_validate(with_values(raw, case.values), context={"study": path})
+        tables = model.model_validate(with_values(raw, case.values), context={"study": path, "code": code})
     except ValidationError as error:
         renamed = {key: f"vary.{key}" for key in case.values}
         raise told(str(path), model, error, renamed) from None

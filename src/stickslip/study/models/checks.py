@@ -7,11 +7,11 @@ from typing import Any
 
 from stickslip.assembly.contact import ALONE, GROUND, NEXT, SPATIAL
 from stickslip.assembly.forces import engine_order
-from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
 from stickslip.model.structure import is_numbered
 from stickslip.study.file.model.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
+from stickslip.study.file.model.contacts import law_class
 from stickslip.study.file.model.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.section import Section
 from stickslip.study.file.study import StudyFile
@@ -461,7 +461,7 @@ def run_up_refusals(tables: Tables) -> Iterator[InputError]:
             "Leave it out, or compute forced responses at single speeds.",
         )
     for name, table in contacts.items():
-        if asked.rate_rpm_per_s and ALL_LAWS[table.law] is RigidCoulomb:
+        if asked.rate_rpm_per_s and law_class(table.law) is RigidCoulomb:
             yield input_error(
                 "run_up.rate_rpm_per_s",
                 f"needs contact forces that follow from gaps, and contact.{name}.law is {table.law}",

@@ -24,11 +24,12 @@ from stickslip.model.readers.ansys_archive import (
     read_ansys_materials,
 )
 from stickslip.model.readers.calculix_deck import Deck, read_deck
-from stickslip.model.readers.open_model import read_structure
+from stickslip.model.readers.open_model import read_structure, refuse_other_models
 from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.parts import FileModel, SetTable
+from stickslip.study.own_code import called
 
 EDGE = 1e-9  # of the size of the mesh, by which boxes and cylinders are larger: nodes lie on their faces
 
@@ -142,6 +143,8 @@ def file_part(key: str, table: FileModel, home: Path, material: Material | None,
     path = home / table.file
     name = path.name.lower()
     try:
+        if table.reader is not None:
+            return _from_own_reader(key, table, home, material, others)
         if name.endswith(DECKS):
             return _from_deck(key, table, path, material, others)
         if name.endswith(ARCHIVES):
@@ -292,7 +295,21 @@ def _solid(
     )
 
 
-def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any]) -> Part:
+def _from_own_reader(key: str, table: FileModel, home: Path, material: Material | None, others: dict[str, Any]) -> Part:
+    """Read a part by a function of the user."""
+    place = f"{key}.reader"
+    found = called(str(table.reader), place, home / table.file, units=_units(table))
+    refuse_other_models(place, str(table.reader), found)
+    if not isinstance(found, SolidMesh):
+        return _from_matrices(key, table, home, others, found)
+    if material is None:
+        raise input_error(f"{key}.material", "is missing", "Add the table [material], or one of the part.")
+    return _solid(key, table, found, material, _sectors(key, table), None, **others)
+
+
+def _from_matrices(
+    key: str, table: FileModel, home: Path, others: dict[str, Any], own: Structure | None = None
+) -> Part:
     if table.clamped:
         raise input_error(
             f"{key}.clamped",
@@ -301,7 +318,7 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
         )
     sectors = _sectors(key, table)
     files = {name: home / file for name, file in table.files().items()}
-    structure = _matrices(key, table, files)
+    structure = _matrices(key, table, files) if own is None else own
     picked = with_sets(key, table.sets, structure.dofs.position, structure.sets)
     structure = replace(structure, sets=picked)
     if table.plausible:

@@ -18,6 +18,7 @@ from stickslip.study.models.checks import refuse
 from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
 from stickslip.study.models.parts import Memo, digest, digest_of
+from stickslip.study.own_code import OwnCode
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +98,14 @@ class Study:
             If a key is unknown, a value is refused, or the key is varied.
         """
         raw = with_values(self.file.raw, values, keep_vary=True)
-        found = validated(self.path, raw)
+        found = validated(self.path, raw, self.file.code)
         refuse_varied(str(self.path), raw, values)
-        changed = StudyFile(self.path, self.text, raw, found)
+        changed = StudyFile(self.path, self.text, raw, found, self.file.code)
         return _checked(Study(changed, self.memo))
 
     def _case(self, index: int, case: TablesOfCase) -> Case:
         whole, at_rest = model_digests(case.tables, self.file.home)
-        other = OtherModel(self.path, with_values(self.file.raw, case.values), self.memo)
+        other = OtherModel(self.path, with_values(self.file.raw, case.values), self.file.code, self.memo)
         return Case(
             index=index,
             label=case.label,
@@ -130,12 +131,15 @@ class OtherModel:
         Path of the study file.
     raw
         Content of the file with the values of the case.
+    code
+        Code of the user that the file names.
     memo
         Built parts; empty in another process.
     """
 
     path: Path
     raw: Mapping[str, Any]
+    code: OwnCode
     memo: Memo = field(default_factory=dict, repr=False)
 
     def __call__(self, key: str, value: float) -> Model:
@@ -162,7 +166,8 @@ class OtherModel:
         """
         raw = {**self.raw, "vary": {key: [value]}}
         try:
-            return _checked(Study(StudyFile(self.path, "", raw, validated(self.path, raw)), self.memo))
+            cases = validated(self.path, raw, self.code)
+            return _checked(Study(StudyFile(self.path, "", raw, cases, self.code), self.memo))
         except InputError as error:
             raise self._refused(key, value, error) from None
 
@@ -172,18 +177,18 @@ class OtherModel:
         return input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path, "raw": self.raw, "memo": {}}
+        return {"path": self.path, "raw": self.raw, "code": self.code, "memo": {}}
 
 
-def read_study(path: Path) -> Study:
-    """Read a study file and make all checks that need no mesh.
+def read_study(path: Path, *, allow_code: bool = False) -> Study:
+    """Read a study file and make all checks that need no mesh; `allow_code` as for `read_file`.
 
     Raises
     ------
     InputError
         Naming every problem of the file, one a line.
     """
-    return _checked(Study(read_file(path)))
+    return _checked(Study(read_file(path, allow_code=allow_code)))
 
 
 def _drive(tables: Tables) -> float:

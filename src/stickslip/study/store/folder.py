@@ -10,6 +10,7 @@ from stat import S_ISLNK, S_ISREG
 from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
+from stickslip.study.own_code import CODE_FILE
 from stickslip.study.store.atomic_write import REMEDIES, beside, unwritable, unwritable_database
 from stickslip.study.store.journal import AT_WORK, BESIDE, SEALED
 
@@ -19,7 +20,7 @@ JOBS, PARTS = "jobs", "parts"
 TRIAL = ".stickslip-trial"
 LONGEST_PATH = 512  # bytes of the path of an SQLite file
 LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # of such a file in a folder
-WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until they are whole
+WHOLE = (RESULT, REPORT, CODE_FILE, f"{PARTS}/*.npz")  # files that have another name until they are whole
 OWN = (*WHOLE, *map(beside, WHOLE), *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)))
 LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
 SHARD_LOGS = "run-*-of-*.log"

@@ -11,6 +11,7 @@ from time import monotonic
 from typing import Any
 
 from stickslip.errors import StickslipError
+from stickslip.study.own_code import Shipped
 from stickslip.study.store.attempts import clear, file_at_work, new_owner, until_sealed_elsewhere
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.progress import LOG, OF_RECORDS
@@ -41,6 +42,8 @@ class Parcel:
         Limits on time and memory.
     owner
         Owner of the file at work; empty: no other process may write it.
+    code
+        Code of the user that the job needs; None for none.
     """
 
     content: bytes
@@ -49,6 +52,7 @@ class Parcel:
     question: str
     limits: Limits
     owner: str = ""
+    code: Shipped | None = None
 
     @property
     def file(self) -> Path:
@@ -90,6 +94,8 @@ def watched(
 
 def unpacked(parcel: Parcel) -> None:
     """Unpack and solve a job; runs in the job's own process."""
+    if parcel.code is not None:
+        parcel.code.importable()
     try:
         solve, order = pickle.loads(parcel.content)
     except UNKNOWN as error:

@@ -1,19 +1,31 @@
 """The tables [contact.NAME] and [join.NAME]; the keys of a law are the fields of its dataclass."""
 
+from collections.abc import Callable
 from functools import cache
+from inspect import signature
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    WrapValidator,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from stickslip.assembly.contact import GROUND, NEXT, SPATIAL, PairingKind, Share
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
-from stickslip.errors import did_you_mean
+from stickslip.errors import InputError, did_you_mean
 from stickslip.study.file.model.bodies import Triple
 from stickslip.study.file.model.parts import union_of
+from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, shown
+from stickslip.study.own_code import is_address, of_address
 
 POPULATIONS: dict[str, type] = {
     "uniform_band": UniformBand,
@@ -38,7 +50,18 @@ def _known_kind(given: Any) -> Any:
 
 
 PopulationTable: Any = Annotated[union_of(_TABLES, _kind), BeforeValidator(_known_kind)]
-Law: Any = Literal[tuple(ALL_LAWS)]
+MEMBERS = ("kernel", "pairs", "parameters", "initial_state", "stuck_stiffness")  # of a law
+
+
+def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
+    """Check a name, or a module path."""
+    if not is_address(given):
+        return check(given)
+    own_object(info, given, "contact law", MEMBERS)
+    return given
+
+
+Law: Any = Annotated[Literal[tuple(ALL_LAWS)], WrapValidator(_named_or_own)]
 Between = Annotated[list[Name], Field(min_length=2, max_length=2)]
 
 
@@ -124,10 +147,16 @@ class ContactBase(Pair):
         description="how far the surfaces would overlap at rest if nothing gave way, in m, 0 for none: it presses them "
         "by the normal stiffness times itself",
     )
-    law: Law = Field(description="the contact law: " + ", ".join(ALL_LAWS))
+    law: Law = Field(
+        description=f"the contact law: {', '.join(ALL_LAWS)}; or my_module:Class, a law of your own, with --allow-code"
+    )
     per: Share = Field(
         "interface",
         description="what stiffnesses and forces are of: interface (shared among its points), point, or area (N/m³ and Pa)",
+    )
+    parameters: dict[str, Any] | None = Field(
+        None,
+        description="of a law of your own: its parameters by their names in Python, in SI, such as { k_t = 2e4, limit = 5.0 }",
     )
 
     @model_validator(mode="after")
@@ -140,7 +169,13 @@ class ContactBase(Pair):
                 "A contact at rest is open, pressed by what overlaps, or pressed by a force: give one of them.",
                 given[1],
             )
-        refused_by(ALL_LAWS[self.law], self.library)
+        if self.parameters is not None and not is_address(self.law):
+            raise custom_error(
+                f"is of a law of your own, and law is {self.law!r}",
+                f"Write the keys of {self.law} into the table of the contact.",
+                "parameters",
+            )
+        refused_by(law_class(self.law), self.library)
         return self
 
     @property
@@ -159,15 +194,40 @@ class ContactBase(Pair):
 
     def library(self) -> ContactLaw:
         """Return the law with the given parameters."""
+        if is_address(self.law):
+            return _own_law(self.law, self.parameters or {})
         table = getattr(self, "population", None)
         given = {} if table is None else {"population": build(POPULATIONS[table.kind], table)}
         law: ContactLaw = build(ALL_LAWS[self.law], self, per_area=self.per == "area", **given)
         return law
 
 
+def law_class(law: str) -> type:
+    """Return the class of a law by its name or module path."""
+    found: type = of_address(law) if is_address(law) else ALL_LAWS[law]
+    return found
+
+
+def _own_law(address: str, parameters: dict[str, Any]) -> ContactLaw:
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in parameters.items()}
+    try:
+        law: ContactLaw = law_class(address)(**given)
+    except InputError as error:
+        raise custom_error(error.problem, error.remedy, f"parameters.{error.argument}".rstrip(".")) from None
+    except Exception as error:
+        name = address.partition(":")[2]
+        asked = f"{name}{signature(law_class(address))}"
+        raise custom_error(
+            f"{name} is not made of {shown(parameters)}: {error}", f"Give what it takes: {asked}.", "parameters"
+        ) from error
+    return law
+
+
 @cache
 def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
     """Return the keys of a law and whether each is required."""
+    if is_address(law):
+        return {"preload_pa" if per_area else "preload_n": False}
     columns = columns_of(ALL_LAWS[law], per_area=per_area)
     others = ["preload_pa" if per_area else "preload_n", *(["population"] if law == "iwan" else [])]
     return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(others, False)
@@ -194,6 +254,10 @@ def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
 
 def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
     """Return the error about a key that belongs to another law or to another `per`."""
+    if is_address(law):
+        return custom_error(
+            f"is no key of {law}, got {shown(value)}", "Give it under parameters, by its name in Python."
+        )
     if key in keys_of(law, per_area=not area):
         ours, theirs = (list(keys_of(law, per_area=a)) for a in (area, not area))
         what = '"area"' if area else "one other than area"
@@ -233,4 +297,4 @@ def _made() -> type[ContactBase]:
 
 
 ContactTable = _made()
-__all__ = ["ContactTable", "JoinTable", "Pair", "keys_of"]
+__all__ = ["ContactTable", "JoinTable", "Pair", "keys_of", "law_class"]

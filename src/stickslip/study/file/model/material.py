@@ -1,16 +1,23 @@
 """The tables [material], [damping] and [reduction], of the whole study or of a part."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
 
+from stickslip.arrays import IntArray
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
+from stickslip.model.part import Reducing
 from stickslip.model.readers.units import MODULI, SOLIDS
+from stickslip.model.structure import Structure
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
+from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
+from stickslip.study.own_code import is_address, made, of_address, state_of
 
 FEW = 25  # fixed-interface modes where the study does not say
 OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
@@ -50,14 +57,53 @@ class _PlausibleMaterial(Section):
 MaterialTable: Any = table_of(Material, base=_PlausibleMaterial, name="MaterialTable")
 
 
+@dataclass(frozen=True)
+class OwnReduction:
+    """A reduction of the user.
+
+    Parameters
+    ----------
+    made
+        The reduction: a dataclass with `of` and `in_words`.
+    code
+        State of its code, on which reduced parts that are kept on disk depend.
+    """
+
+    made: Reducing
+    code: str
+
+    def of(self, structure: Structure, keep: IntArray) -> Structure:
+        """Return a structure reduced to the dofs `keep` and whatever the user adds."""
+        return self.made.of(structure, keep)
+
+    @property
+    def in_words(self) -> str:
+        """Method in words."""
+        return self.made.in_words
+
+
+def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
+    """Check a name, or a module path."""
+    if not is_address(given):
+        return check(given)
+    found = own_object(info, given, "reduction", ("of", "in_words"), instance=True)
+    if not is_dataclass(found):
+        raise custom_error(
+            f"is a {type(found).__name__}, which is no dataclass, got {given!r}",
+            "Make it one: parts are kept by its parameters.",
+        )
+    return given
+
+
 class ReductionTable(Section):
     """Reduction of a part: what contacts, loads and outputs need stays physical, the rest becomes a few modes."""
 
-    method: Literal["craig_bampton", "rubin", "none"] = Field(
+    method: Annotated[Literal["craig_bampton", "rubin", "none"], WrapValidator(_named_or_own)] = Field(
         "craig_bampton",
         description="craig_bampton (modes with the physical dofs fixed), rubin (with them free; exact free modes), or none: the part "
         "is kept whole; where more than 5000 dofs touch no contact nothing is condensed either; [forced_response], [modes] and "
-        "[campbell] take such a model, without stability and time integration",
+        "[campbell] take such a model, without stability and time integration; or my_module:Name, a reduction of your own, with "
+        "--allow-code",
     )
     fixed_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
         None,
@@ -88,7 +134,7 @@ class ReductionTable(Section):
                 raise _not_of(self.method, key)
         if self.method != "craig_bampton" and self.frequency_error is not None:
             raise _not_of(self.method, "frequency_error")
-        if self.method == "none" and self.up_to_hz is not None:
+        if self.up_to_hz is not None and (self.method == "none" or is_address(self.method)):
             raise _not_of(self.method, "up_to_hz")
         if own is not None and self.up_to_hz is not None and getattr(self, own) is not None:
             raise custom_error(f"is given together with {own}", "Give a number of modes or a frequency.", "up_to_hz")
@@ -105,8 +151,10 @@ class ReductionTable(Section):
             raise custom_error("is missing with rubin", "Give a number of modes, or up_to_hz.", "free_interface_modes")
         return self
 
-    def library(self) -> Reduction | None:
+    def library(self) -> Reducing | None:
         """Return the reduction; None for none."""
+        if is_address(self.method):
+            return OwnReduction(made(of_address(self.method), self.method), state_of(self.method))
         if self.method == "none":
             return None
         return Reduction(self._n_modes(), self.method)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from stickslip.assembly.contact import NEXT
 from stickslip.errors import did_you_mean, nearest
@@ -13,6 +13,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.study.file.model.bodies import Cylinder, FlatCurved, RigidBodyTable, Steps, Triple, Wedge, shape
 from stickslip.study.file.model.material import DampingTable, MaterialTable, ReductionTable
+from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
 
@@ -178,6 +179,10 @@ class FileModel(PartTable):
     units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s", "foot-slug-s"] = Field(
         description="the file's unit system, one of SI, mm-t-s (mm, tonne, s; N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"
     )
+    reader: str | None = Field(
+        None,
+        description="my_module:function, a reader of your own for the file, with --allow-code: function(path, units=units) returns a structure or a mesh in SI; left out: a reader by the file's suffix",
+    )
     plausible: bool = Field(
         True,
         description="whether mass and size are checked against what solids have: true, or false where the numbers are right",
@@ -229,6 +234,13 @@ class FileModel(PartTable):
     nodes: FilePath | None = Field(
         None, description="with matrices in separate files: CSV of node, component, x, y, z of every row"
     )
+
+    @field_validator("reader")
+    @classmethod
+    def _is_code(cls, given: str | None, info: ValidationInfo) -> str | None:
+        if given is not None:
+            own_object(info, given, "function", ("__call__",))
+        return given
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
