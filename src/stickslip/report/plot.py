@@ -77,6 +77,8 @@ class Plot:
         The case shown first.
     controls
         HTML above the figure for scripts that change it; already escaped.
+    folded
+        Line shown while the figure is folded away; empty for an open figure.
     """
 
     key: str
@@ -86,6 +88,7 @@ class Plot:
     case_captions: Mapping[int, str] = field(default_factory=dict)
     chosen: int = -1
     controls: Markup = field(default_factory=Markup)
+    folded: str = ""
 
     def __post_init__(self) -> None:
         """Hide the traces that belong to other cases, for a reader without scripts and for the first view."""

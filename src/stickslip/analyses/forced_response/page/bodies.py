@@ -5,6 +5,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 from plotly.subplots import make_subplots
 
+from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import CASE, ShownCase
@@ -153,7 +154,7 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
             )
         line = {"color": case.colour, "width": 1.6}
         y = np.where(total[at] > 0, total[at], np.nan)
-        curve = go.Scatter(x=response.hz[at], y=y, mode="lines", name=case.short, line=line)
+        curve = go.Scatter(x=abscissa(response)[0][at], y=y, mode="lines", name=case.short, line=line)
         figure.add_trace(curve.update(showlegend=len(response.cases) > 1), 1, 2)
 
 
@@ -165,7 +166,8 @@ def energy(response: Response) -> Plot | None:
     total = np.where(response.converged, np.nansum(values, axis=1), np.nan)
     total = np.where(total < _NOTHING, 0.0, total)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")
-    titles = ("at the peak, by contact point", "all contacts, against frequency")
+    _, over, unit = abscissa(response)
+    titles = ("at the peak, by contact point", f"all contacts, against {over}")
     figure = make_subplots(1, 2, horizontal_spacing=0.12, subplot_titles=titles)
     _energy_traces(figure, response, values * bars.factor, total * sums.factor)
     styled(figure, 400, legend_title=CASE)
@@ -176,7 +178,7 @@ def energy(response: Response) -> Plot | None:
         span = [np.log10(max(top * 1e-6, float(drawn.min()) / 1.5)), np.log10(1.6 * top)]
         figure.update_yaxes(type="log", range=span, **log_ticks(drawn), col=2)
     figure.update_yaxes(title_text=f"energy ({sums.unit})", col=2)
-    figure.update_xaxes(title_text="frequency (Hz)", col=2)
+    figure.update_xaxes(title_text=f"{over} ({unit})", col=2)
     key = Markup(", ").join(
         Markup('<b style="color:{}">{}</b>').format(c, g) for g, c in group_colours(response).items()
     )
@@ -188,16 +190,17 @@ def energy(response: Response) -> Plot | None:
 
 
 def _widest_range(response: Response, total: FloatArray) -> str:
-    """Name the case in which friction dissipates over the widest frequency range."""
+    """Name the case in which friction dissipates over the widest range."""
+    x, _, unit = abscissa(response)
     widths = []
     for case in response.cases:
         at = response.points(case)
-        lossy = response.hz[at][np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))]
+        lossy = x[at][np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))]
         widths.append(float(np.ptp(lossy)) if lossy.size else 0.0)
     if not any(widths):
         return "No point dissipates energy."
     widest = int(np.argmax(widths))
     return (
-        f"Friction acts over the widest range, {number(widths[widest])} Hz with more than a hundredth of the case's "
+        f"Friction acts over the widest range, {number(widths[widest])} {unit} with more than a hundredth of the case's "
         f"maximum{',' if response.cases[widest].where else ''}{response.cases[widest].where}."
     )

@@ -18,7 +18,7 @@ from stickslip.analyses.forced_response.page.contacts import (
     state_map,
     surface_map,
 )
-from stickslip.analyses.forced_response.page.curves import frequency_response, low_order, of_each_order
+from stickslip.analyses.forced_response.page.curves import abscissa, frequency_response, low_order, of_each_order
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
 from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
@@ -109,11 +109,12 @@ def _shift_card(response: Response) -> Card | None:
     if len(within) < 2:
         return None
     first, last = within[0], within[-1]
-    a, b = response.peak_hz(first), response.peak_hz(last)
+    x, _, unit = abscissa(response)
+    a, b = (float(x[response.peak(c)]) for c in (first, last))
     blades = [response.blade_at_peak(c) for c in (first, last)]
-    note = f"from {number(a, 5)} Hz{blades[0]}{first.where} to {number(b, 5)} Hz{blades[1]}{last.where}"
+    note = f"from {number(a, 5)} {unit}{blades[0]}{first.where} to {number(b, 5)} {unit}{blades[1]}{last.where}"
     label = f"shift of the peak ({percent(100 * (b / a - 1))})"
-    return Card(f"{number(b - a)} Hz", label, note)
+    return Card(f"{number(b - a)} {unit}", label, note)
 
 
 def _damping_card(response: Response) -> Card | None:
@@ -170,7 +171,7 @@ def cards(response: Response) -> list[Card]:
 
 def peaks(response: Response) -> Table:
     """Return a table with one row a case: peak, points, work."""
-    cases = response.cases
+    cases, (x, _, unit_at) = response.cases, abscissa(response)
     value = np.array([response.peak_response(c) for c in cases])
     force = np.array([c.excitation for c in cases])
     newton, forces = column(force, "N")
@@ -181,7 +182,7 @@ def peaks(response: Response) -> Table:
         f"excitation ({newton})",
         f"peak ({length})",
         f"peak / force ({unit})",
-        "at (Hz)",
+        f"at ({unit_at})",
         "damping ratio (%)",
         "quality factor",
         "verdict",
@@ -196,17 +197,20 @@ def peaks(response: Response) -> Table:
         "rest (s)",
     ]
     dampings, qualities = aligned(100 * zeta, 3), aligned(0.5 / zeta, 3)
+    places = [float(x[response.peak(c)]) if response.peak(c) >= 0 else np.nan for c in cases]
     rows = [
         [
             case.short,
             *own,
-            fixed(response.peak_hz(case), 2),
+            fixed(place, 2),
             damping,
             quality,
             response.level(case) or NONE,
             *_work(response.numbers_of[case.index]),
         ]
-        for case, *own, damping, quality in zip(cases, forces, sizes, ratios, dampings, qualities, strict=True)
+        for case, *own, place, damping, quality in zip(
+            cases, forces, sizes, ratios, places, dampings, qualities, strict=True
+        )
     ]
     told = [*_damping_sentence(zeta), *_work_sentence(response)]
     return response.table("", told, head, rows)

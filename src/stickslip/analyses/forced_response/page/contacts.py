@@ -16,7 +16,9 @@ from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.tiles import outlines, patches
 
 _ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it is a line
-_MOST_LOOPS = 24  # panels
+SHOWN_LOOPS = 6  # panels, of the points that dissipate most; the others are folded away
+_MOST_LOOPS = 24  # panels of both
+_FAR = 3.0  # mean of a loop over its half range, from which the picture would be an axis of equal digits
 _MOST_ROW = 4  # of them beside each other, where contact lines have more points
 _MOST_STATES = 40  # rows with a name of their own
 _MOST_SAMPLES = 40_000  # of all loops of a figure, and of all rows of states
@@ -121,67 +123,94 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
     )
 
 
-def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> list[list[int]]:
-    """Return the contact points to draw, by row: those with a force; of many those with the largest dissipation in any case."""
+def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> tuple[list[int], list[int]]:
+    """Return the contact points to draw, those that dissipate most in any case first: those shown, and those folded away; none without a force."""
     spans = [np.ptp(response.periods[c.index].peak_force[:, direction], axis=-1) for c in cases]
-    acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
-    if len(acting) > _MOST_LOOPS:
-        area = np.max([_area(response, c, direction) for c in cases], axis=0)
-        most = _MOST_LOOPS if area.any() else _MOST_ROW  # straight lines are all alike
-        acting = sorted(acting, key=lambda k: -area[k])[:most]
-        return _wrapped([sorted(acting)])
-    rows = [[k for k in row if k in acting] for row in contact_lines(response)]
-    return _wrapped([row for row in rows if row])
+    acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0))
+    area = np.max([_area(response, c, direction) for c in cases], axis=0)
+    order = acting[np.argsort(-area[acting], kind="stable")].tolist()
+    loops = [k for k in order if area[k] > 0]
+    most = _MOST_LOOPS if loops else _MOST_ROW  # straight lines are all alike
+    shown = loops[:SHOWN_LOOPS]
+    return shown, order[len(shown) : most]
 
 
-def _hysteresis(response: Response, direction: str) -> Plot | None:
+def _about_mean(values: list[FloatArray]) -> bool:
+    """Whether the mean of a loop (..., sample) is so far from zero that the picture needs it removed."""
+    every = np.nan_to_num(np.concatenate([v.reshape(-1, v.shape[-1]) for v in values]))
+    return bool(np.any(np.abs(every.mean(axis=-1)) > _FAR * np.ptp(every, axis=-1) / 2))
+
+
+def _hysteresis(response: Response, direction: str) -> list[Plot]:
     """Loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
     column = {"t": 0, "w": 1}[direction]
     cases = tuple(c for c in response.peaked if np.isfinite(response.periods[c.index].peak_gap).any())
-    names, rows = response.labels("contact"), _panels(response, cases, column) if cases else []
-    if not rows:
-        return None
+    shown, others = _panels(response, cases, column) if cases else ([], [])
+    captions = {c.index: _loop_caption(response, c, column) for c in cases}
+    title = f"Hysteresis loops at the peak, direction {direction}"
+    acting = len(shown) + len(others)
+    found = []
+    if shown:
+        figure, told = _loops(response, cases, column, shown)
+        caption = f"Tangential force on the contact points against their relative displacement along {direction}, in one panel a point. Axes differ between panels. The area of a loop is the energy lost in a cycle.{told}"
+        if acting > len(shown):
+            caption += f" The {len(shown)} points that dissipate most, the largest first."
+        found.append(Plot(f"loops_{direction}", title, caption, figure, captions, response.chosen))
+    if others:
+        figure, told = _loops(response, cases, column, others)
+        caption = f"Tangential force against relative displacement along {direction}, of {counted(len(others), 'further point') if shown else counted(len(others), 'point')} with a force along {direction}.{told}"
+        key, fold = (
+            (f"loops_{direction}_others", "Loops of the other points") if shown else (f"loops_{direction}", title)
+        )
+        summary = f"{fold}, direction {direction}" if shown else f"{title}: straight lines"
+        found.append(Plot(key, title, caption, figure, captions, response.chosen, folded=summary))
+    return found
+
+
+def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points: list[int]) -> tuple[go.Figure, str]:
+    """Return the panels of contact points in a tangential direction, and a sentence on means taken out of them."""
+    names, rows = response.labels("contact"), _wrapped([points])
     width = max(len(r) for r in rows)
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
     space = {"horizontal_spacing": 0.21 / width, "vertical_spacing": 0.23 / len(rows)}
     figure = make_subplots(len(rows), width, subplot_titles=titles, **space)
-    at = _drawn_samples(len(cases) * sum(map(len, rows)), response.periods[cases[0].index].peak_gap.shape[-1])
-    stated = _stated(response)
+    own = {c.index: response.periods[c.index] for c in cases}
+    gaps = {k: 1e6 * one.peak_gap[points, column] for k, one in own.items()}
+    forces = {k: one.peak_force[points, column] for k, one in own.items()}
+    moved, pulled = (_about_mean(list(of.values())) for of in (gaps, forces))
+    at = _drawn_samples(len(cases) * len(points), own[cases[0].index].peak_gap.shape[-1])
+    stated, places = _stated(response), [(i, j) for i, row in enumerate(rows) for j in range(len(row))]
     for case in cases:
-        own = response.periods[case.index]
-        gap, force = own.peak_gap[..., at], own.peak_force[..., at]
-        state = own.peak_state[..., at] if case in stated else None
-        for i, row in enumerate(rows):
-            for j, k in enumerate(row):
-                known = state[k, column] if state is not None else None
-                loop = _loop(gap[k, column] * 1e6, force[k, column], known, names[k])
-                figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
+        state = own[case.index].peak_state[points, column][:, at] if case in stated else None
+        gap, force = (
+            of[case.index] - off * of[case.index].mean(axis=-1, keepdims=True)
+            for of, off in ((gaps, moved), (forces, pulled))
+        )
+        for n, (i, j) in enumerate(places):
+            known = state[n] if state is not None else None
+            loop = _loop(gap[n, at], force[n, at], known, names[points[n]])
+            figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
     for trace in _state_keys() if stated else []:
         figure.add_trace(trace, row=1, col=1)
     styled(figure, 130 + 215 * len(rows))
     legend_above(figure)
-    figure.update_yaxes(nticks=6, title_text="force (N)", col=1)
+    figure.update_yaxes(nticks=6, title_text=f"force{' about its mean' * pulled} (N)", col=1)
     figure.update_xaxes(nticks=6)
     for j in range(width):
         last = max(i for i, row in enumerate(rows) if j < len(row))
-        figure.update_xaxes(title_text="relative displacement (µm)", row=last + 1, col=j + 1)
-    drawn = sum(map(len, rows))
-    caption = f"Tangential force on the contact points against their relative displacement along {direction}, in one panel a point. Axes differ between panels. The area of a loop is the energy lost in a cycle."
-    if drawn < len(names):
-        caption += (
-            f" {drawn} of {len(names)} points are drawn: the points with a force along {direction} that dissipate most."
+        figure.update_xaxes(
+            title_text=f"relative displacement{'<br>about its mean' * moved} (µm)", row=last + 1, col=j + 1
         )
-    captions = {c.index: _loop_caption(response, c, column) for c in cases}
-    title = f"Hysteresis loops at the peak, direction {direction}"
-    return Plot(f"loops_{direction}", title, caption, figure, captions, response.chosen)
+    out = [word for word, off in (("displacements", moved), ("forces", pulled)) if off]
+    return figure, f" The mean is taken out of the {joined(out)}." if out else ""
 
 
-def hysteresis_t(response: Response) -> Plot | None:
+def hysteresis_t(response: Response) -> list[Plot]:
     """Draw loops along the first tangent."""
     return _hysteresis(response, "t")
 
 
-def hysteresis_w(response: Response) -> Plot | None:
+def hysteresis_w(response: Response) -> list[Plot]:
     """Draw loops along the second tangent."""
     return _hysteresis(response, "w")
 

@@ -152,7 +152,7 @@ def _peaks(response: Response) -> str:
     known = [c for c in response.peaked if response.resonates(c)] or response.peaked
     scale, ends = response.scale, (*known[:1], *known[1:][-1:])
     peaks = [
-        f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {number(response.peak_hz(c), 5)} Hz{response.blade_at_peak(c)}{c.where}"
+        f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {response.place(c)}{response.blade_at_peak(c)}{c.where}"
         for c in ends
     ]
     if len(ends) > 1:
@@ -161,7 +161,7 @@ def _peaks(response: Response) -> str:
 
 
 def _caption(response: Response) -> str:
-    converged, hz = response.converged, response.hz
+    converged, (x, _, unit) = response.converged, abscissa(response)
     high = converged & response.more
     over = " divided by the amplitude of the excitation" if response.per_force else ""
     name = amplitude_name(response.data)
@@ -170,8 +170,8 @@ def _caption(response: Response) -> str:
         text += f"All points keep the same harmonics (`{response.selection}`)."
     else:
         n = counted(int(converged.sum()), "accepted point")
-        ends = [number(float(f), 4) for f in (hz[high].min(), hz[high].max())] if high.any() else []
-        where = f", from {' to '.join(ends)} Hz" if ends else ""
+        ends = [number(float(f), 4) for f in (x[high].min(), x[high].max())] if high.any() else []
+        where = f", from {' to '.join(ends)} {unit}" if ends else ""
         text += (
             f"{int(high.sum())} of {n} keep {response.more_name} (diamonds){where}; the rest keep "
             f"H = {response.low_name} (circles)."
