@@ -10,12 +10,15 @@ import meshio
 import numpy as np
 import pytest
 import pyuff
+import xarray as xr
+from scipy.spatial import KDTree
 from solid_models import box
 from test_assembly_wheel import ORDER, SECTORS, sector_model, shrouded_sector
 from typer.testing import CliRunner
 
 import stickslip as ss
 from stickslip.api.model import Model
+from stickslip.arrays import ComplexArray
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.full_field import nodes_of
 from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
@@ -390,3 +393,44 @@ def test_a_page_is_no_result_and_the_refusal_names_what_can_be_written(tmp_path)
         "both.html: is a page, and no result. Give the folder of a run, or the result.nc in it."
     )
     assert told.output.count("\n") == 1
+
+
+def drawn(data: xr.Dataset, of: str) -> ComplexArray:
+    """Return the motion of drawn points or contact points at the peak in the first harmonic."""
+    parts = data[of].values[0, 0]
+    return np.asarray(parts[..., 0] + 1j * parts[..., 1])
+
+
+def test_what_pages_draw_of_copies_moves_as_the_unreduced_model_says(beams):
+    _, result, model = beams
+    data = result["forced_response"]
+    wanted = solved(model, float(data["frequency_hz"].values[int(data["peak_point"].values[0])]))
+    found, kinds = drawn(data, "peak_drawn_motion"), set(data["drawn_kind"].values.tolist())
+    assert kinds == {"mesh"}
+    for nodes in nodes_of(model):
+        mine = data["drawn_part"].values == nodes.part
+        off, at = KDTree(nodes.points).query(data["drawn_point"].values[0, mine])
+        assert off.max() < 1e-12
+        assert np.abs(found[mine] - nodes.of(wanted)[at]).max() < 1e-5 * np.abs(wanted).max()  # single precision
+    (one, _) = nodes_of(model)
+    at = KDTree(one.points).query(data["contact_position"].values)[1]
+    assert np.abs(drawn(data, "peak_contact_motion") - one.of(wanted)[at]).max() < 1e-5 * np.abs(wanted).max()
+    # both loads act on the node set in the middle: one is static
+    assert data["drawn_load"].values.tolist() == ["weight", "shaker"]
+    assert data["drawn_load_harmonic"].values.tolist() == [0, 1]
+    assert np.allclose(data["drawn_load_direction"].values, [[0, 1, 0], [0, 0, 1]])
+    assert np.allclose(data["drawn_load_point"].values[:, 0], 0.06)
+    held = data["drawn_support"].values
+    assert len(held)
+    assert set(np.round(held[:, 0], 9)) == {0.0, 0.2}
+
+
+def test_what_pages_draw_of_a_sector_moves_as_the_wave_of_the_unreduced_wheel(wheel):
+    result, model = wheel
+    data = result["forced_response"]
+    peak = float(data["frequency_hz"].values[int(data["peak_point"].values[0])])
+    wanted = solved(model, peak, ORDER)
+    (nodes,) = nodes_of(model)
+    at = KDTree(nodes.points).query(data["drawn_point"].values[0])[1]
+    found = drawn(data, "peak_drawn_motion")
+    assert np.abs(found - nodes.of(wanted)[at]).max() < 1e-5 * np.abs(wanted).max()

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
+from synthetic_result import provenance, synthetic_result, tree_of
 
 from stickslip.analyses.forced_response.page.chapter import peaks
 from stickslip.analyses.forced_response.page.contacts import SHOWN_LOOPS, hysteresis_t
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.page import report_html
-from tests.synthetic_result import provenance, synthetic_result, tree_of
 
 
 def of_ellipses(half_axes: list[float], mean: float = 0.0) -> xr.Dataset:

@@ -14,9 +14,9 @@ from test_report import marks, needs_browser, open_page, page_text
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.waves.page.campbell import campbell_diagram
 from stickslip.analyses.waves.page.safe import interference, safe_diagram, zigzag
-from stickslip.analyses.waves.page.shapes import coarse_skin
 from stickslip.analyses.waves.page.waves import Waves, view_of
 from stickslip.analyses.waves.records import Campbell, Interference
+from stickslip.model.mesh.coarse import coarse_skin
 
 TITLE = "A <flat> ring & nothing else"
 

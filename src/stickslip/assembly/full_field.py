@@ -19,6 +19,7 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.reduction.waves import wave
 from stickslip.response.system import System
 
+COLUMNS = 64  # of a way that are found together
 Felt = Callable[[DynamicStiffness], DynamicStiffness]
 
 
@@ -135,6 +136,16 @@ class Everywhere:
         every = condensed.recover(omega, retained)
         each = [np.atleast_2d(self._expand(own, h)) for h, own in enumerate(every)]
         return np.stack(each, axis=1)
+
+    def way(self, rows: Matrix, harmonic: int) -> Matrix:
+        """Return the (r, n) matrix from the coordinates to operators `rows` (r, N) on all dofs of a sector, in single precision.
+
+        It takes some columns at a time: one after the other would take as long as the reduction, all at once the memory of the mesh.
+        """
+        n = self.system.structure.n
+        each = (np.eye(n)[:, k : k + COLUMNS] for k in range(0, n, COLUMNS))
+        found = np.hstack([rows @ self._expand(own, harmonic) for own in each])
+        return found.astype(np.complex64 if np.iscomplexobj(found) else np.float32)
 
     def phase(self, harmonic: int, sector: int) -> complex:
         """Return the phase factor of a harmonic between a sector and sector 0, each in its own axes, where all sectors are alike."""

@@ -79,6 +79,7 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
     if body is not None:
         body = body.moved(whole.turn, whole.move)
     surfaces = {name: _moved_points(points, whole) for name, points in template.surfaces.items()}
+    drawn = None if template.drawn is None else template.drawn.moved(whole.turn, whole.move)
     return replace(
         part,
         structure=structure,
@@ -86,6 +87,7 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
         solid=solid,
         body=body,
         surfaces=surfaces,
+        drawn=drawn,
         template=template,
         place=whole,
         **others,
@@ -96,7 +98,8 @@ def placed_body(part: Part, place: Place) -> Part:
     """Return a rigid part with its body axes moved to `place`: an independent part, no copy."""
     assert part.body is not None
     surfaces = {name: _moved_points(points, place) for name, points in part.surfaces.items()}
-    return rigid_part(part.body.moved(place.turn, place.move), surfaces)
+    drawn = None if part.drawn is None else part.drawn.moved(place.turn, place.move)
+    return rigid_part(part.body.moved(place.turn, place.move), surfaces, drawn=drawn)
 
 
 def moved_mesh(mesh: SolidMesh, place: Place) -> SolidMesh:

@@ -23,6 +23,7 @@ from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 REMEMBERED = 4  # reductions of a part that are kept in memory
+MOST_BASIS_BYTES = 100_000_000  # of a way back to all dofs that is kept with them
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,8 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
             n = part.structure.n
             with step(f"reducing part {name}: {n} dofs to {kept.size} of contacts, loads and outputs, and modes", n):
                 made = _reduce(name, part, kept, spin, rest)
+            if not whole and _small(made.structure.basis):
+                part.memo[(*key[:-1], True)] = made  # the motion of pictures needs it after the response
             return made if whole else replace(made, structure=replace(made.structure, basis=None))
 
         if part.reduction is None or part.body is not None or whole:
@@ -246,6 +249,11 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
         forget(part.memo, ReducedPart, REMEMBERED)
     found: ReducedPart = part.memo[key]
     return found
+
+
+def _small(basis: Matrix | None) -> bool:
+    """Return whether a way back to all dofs is small enough to stay in memory."""
+    return isinstance(basis, np.ndarray) and basis.nbytes <= MOST_BASIS_BYTES
 
 
 def _packed(made: ReducedPart) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
+from stickslip.model.rigid.solids import BodySolid, from_faces, prism
 from stickslip.model.structure import Structure
 
 FACES = ("cyclic_low", "cyclic_high")
@@ -146,6 +147,8 @@ class Part:
         Rigid body; None unless the part is rigid.
     surfaces
         Named points of a rigid body.
+    drawn
+        Surface of a rigid body in pictures; None where nothing is known of its shape.
     sectors
         Number of sectors of the wheel of which the part is one sector; 1: no cyclic symmetry.
     faces
@@ -173,6 +176,7 @@ class Part:
     solid: RotatingSolid | None = None
     body: RigidBody | None = None
     surfaces: Mapping[str, BodyPoints] = field(default_factory=dict)
+    drawn: BodySolid | None = None
     sectors: int = 1
     faces: tuple[str, str] = FACES
     cyclic: Literal["node_to_node", "segment_to_segment"] = "node_to_node"
@@ -241,8 +245,13 @@ def structure_part(structure: Structure, **others: Any) -> Part:
 
 
 def rigid_part(body: RigidBody, surfaces: Mapping[str, BodyPoints] | None = None, **others: Any) -> Part:
-    """Return a rigid part, with its contact surfaces by name."""
-    return Part(structure=body.structure(), body=body, surfaces=dict(surfaces or {}), **others)
+    """Return a rigid part, with its contact surfaces by name; pictures show it from these unless it is ``drawn`` otherwise."""
+    own = dict(surfaces or {})
+    if others.get("drawn") is None and own:
+        points = np.vstack([one.position for one in own.values()])
+        normals = np.vstack([one.frame[:, :, 2] for one in own.values()])
+        others["drawn"] = from_faces(points, normals, np.array(body.centre))
+    return Part(structure=body.structure(), body=body, surfaces=own, **others)
 
 
 def damper_part(damper: Damper, **others: Any) -> Part:
@@ -253,4 +262,4 @@ def damper_part(damper: Damper, **others: Any) -> Part:
         own = points.on_sides((side,))
         area = own.area if np.all(np.isfinite(own.area)) else None
         surfaces[side] = BodyPoints(own.names, own.position, own.frame, area)
-    return rigid_part(damper.body(), surfaces, **others)
+    return rigid_part(damper.body(), surfaces, drawn=prism(damper.outline(), *damper.ends), **others)

@@ -14,6 +14,7 @@ INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
 # Okabe and Ito's colours, distinct for colour-blind readers and in grey
 STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
 STATE_NAMES = ("stick", "slip", "open")
+STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
 _NARROW = 0.5  # decades: below, 1-2-5 ticks may leave an axis without any
 _FEW_DECADES = 2.5  # up to here 1-2-5 ticks are far enough apart
 # Okabe and Ito's colours without black and yellow, then darker ones: readable on white, distinct side by side

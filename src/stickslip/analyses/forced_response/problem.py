@@ -19,6 +19,7 @@ from stickslip.assembly.build import static_state
 from stickslip.assembly.extent import Extent, extent_of
 from stickslip.assembly.forces import ANSWER
 from stickslip.assembly.model import Model
+from stickslip.assembly.scene import Scene, scene_of
 from stickslip.assembly.sides.unreduced import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
@@ -171,6 +172,8 @@ class Question:
         Size and stiffness of its bodies; None if the check is off.
     similarity
         Whether Jacobians with few and with many harmonics are compared at every point.
+    scene
+        What pictures show of the model; None without pictures.
     """
 
     label: str
@@ -189,6 +192,7 @@ class Question:
     richer: tuple[System, HarmonicLoad] | None = None
     extent: Extent | None = None
     similarity: bool = False
+    scene: Scene | None = None
 
     @property
     def over_speed(self) -> bool:
@@ -256,12 +260,12 @@ def peak_first(model: Assembled) -> Assembled:
 
 
 def with_comparisons(question: Question, case: Case, model: Model) -> Question:
-    """Return the question with the models for the checks of its peak: more modes, and the extent of its bodies."""
+    """Return the question with the models for the checks of its peak and its pictures: more modes, the extent of its bodies, its scene."""
     order = question.sweep.high_harmonics[-1]
     more = more_modes(model, order, case.store)
     more = None if more is None else peak_first(more)
     richer = None if more is None else (more.system, more.load)
-    return replace(question, richer=richer, extent=extent_of(model, order))
+    return replace(question, richer=richer, extent=extent_of(model, order), scene=scene_of(model, order))
 
 
 def question_of(case: Case, model: Model) -> Question:

@@ -9,6 +9,7 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.forced_response.page.bodies import group_colours, rigid_bodies
 from stickslip.analyses.forced_response.page.contacts import contact_lines, states
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.columns import Drawn, read
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.plot import INK, MUTED, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
@@ -17,7 +18,7 @@ from stickslip.report.tiles import outlines, patches, triangulated
 
 _MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
-_STEEL, _EDGES = "#b9c4d0", "#6f7f91"
+STEEL, BODY, EDGES = "#b9c4d0", "#8d99a6", "#6f7f91"
 _SAID = ("sticks, or stays closed", "slips", "lifts off", "stays open")
 _COLOURS = (*STATE_COLOURS[:3], MUTED)
 _FLAT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}  # colours as in the legend
@@ -71,7 +72,16 @@ def surface(points: FloatArray, triangles: IntArray, **look: Any) -> go.Mesh3d:
 
 def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
     light = {"ambient": 0.65, "diffuse": 0.6, "specular": 0.1, "roughness": 0.9}
-    return surface(points, triangles, color=_STEEL, opacity=opacity, lighting=light, name="skin")
+    return surface(points, triangles, color=STEEL, opacity=opacity, lighting=light, name="skin")
+
+
+def _bodies(solids: list[tuple[str, FloatArray, IntArray]], opacity: float) -> list[go.Mesh3d]:
+    """Draw rigid bodies."""
+    light = {"ambient": 0.65, "diffuse": 0.6, "specular": 0.1, "roughness": 0.9}
+    return [
+        surface(points, triangles, color=BODY, opacity=opacity, lighting=light, name=name)
+        for name, points, triangles in solids
+    ]
 
 
 def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
@@ -205,9 +215,7 @@ def _eye(response: Response) -> dict[str, float] | None:
     return dict(zip("xyz", seen.tolist(), strict=True))
 
 
-def _scene(
-    low: FloatArray, high: FloatArray, *, close: bool, seen: dict[str, float] | None = None
-) -> dict[str, object]:
+def space(low: FloatArray, high: FloatArray, *, close: bool, seen: dict[str, float] | None = None) -> dict[str, object]:
     """Axes of a view of the box between two corners; equal lengths on all axes."""
     eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
     if close:
@@ -244,9 +252,24 @@ def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
     if node.has("peak_state", "contact_position") and node.chosen >= 0:
         drawn = "their patches" if contact_patches(node, 1e3 * node.floats("contact_position")) else "they"
         text += f" Near the contacts {drawn} are coloured by what they do in a cycle at the peak{node.cases[node.chosen].where}."
-    unmeshed = list(rigid_bodies(node))
-    verb = "is rigid and has" if len(unmeshed) == 1 else "are rigid and have"
-    return text + (f" Not drawn: {joined(unmeshed)}, which {verb} no mesh." if unmeshed else "")
+    bodies = sorted({name for name, _, _ in _solids(node)})
+    missing = [name for name in rigid_bodies(node) if name not in bodies]
+    verb = "has" if len(missing) == 1 else "have"
+    text += f" Rigid bodies are darker: {joined(bodies)}." if bodies else ""
+    return text + (f" Not drawn: {joined(missing)}, which {verb} no shape in the result." if missing else "")
+
+
+def _solids(node: Response) -> list[tuple[str, FloatArray, IntArray]]:
+    """Return name, points in mm and triangles of each rigid body with a drawn surface."""
+    own = read(Drawn, node.data, max(node.chosen, 0))
+    if own.drawn_triangle is None or own.drawn_part is None or own.drawn_kind is None:
+        return []
+    bodies = np.isin(own.drawn_kind, ("section", "contact faces"))
+    first = own.drawn_triangle[:, 0]
+    return [
+        (str(name), 1e3 * own.drawn_point, own.drawn_triangle[own.drawn_part[first] == name])
+        for name in dict.fromkeys(own.drawn_part[bodies].tolist())
+    ]
 
 
 def skin_picture(node: Node) -> Plot | None:
@@ -262,28 +285,29 @@ def skin_picture(node: Node) -> Plot | None:
     titles = ("whole", "near the contacts")[: 1 + contacts]
     panels = {"specs": [[{"type": "scene"}] * len(titles)], "subplot_titles": titles}
     figure = make_subplots(1, len(titles), horizontal_spacing=0.02, **panels)
-    whole = [_skin(points, triangles, 1.0), segments(points, drawn, _EDGES, 1.0)]
+    whole = [_skin(points, triangles, 1.0), segments(points, drawn, EDGES, 1.0)]
     figure.add_traces(whole, rows=1, cols=1)
     if contacts and isinstance(node, Response):
         low, high = _neighbourhood(position)
         close, rough = (_inside(points, own, low, high) for own in (pairs, drawn))
         near = [
             _skin(points, _inside(points, triangles, low, high), 0.35),
-            segments(points, close if len(close) <= _MANY_EDGES else rough, _EDGES, 1.0),
+            segments(points, close if len(close) <= _MANY_EDGES else rough, EDGES, 1.0),
             _sections(node, position),
+            *_bodies(_solids(node), 0.5),
         ]
         stated = node.has("peak_state") and node.chosen >= 0
         whole = _contacts(node, position, named=False, keyed=True)
-        figure.add_traces(whole, rows=1, cols=1)
+        figure.add_traces([*_bodies(_solids(node), 1.0), *whole], rows=1, cols=1)
         points_near = _states(node, position) if stated else _contacts(node, position, named=True)
         figure.add_traces([*near, *points_near], rows=1, cols=2)
-        figure.update_layout(scene2=_scene(low, high, close=True, seen=_eye(node)))
+        figure.update_layout(scene2=space(low, high, close=True, seen=_eye(node)))
     styled(figure, 480)
     row = {"orientation": "h", "xanchor": "center", "y": 0, "yanchor": "top", "itemsizing": "constant"}
     legend = row | {"x": 0.24 if contacts else 0.5, "title": {"text": "contacts"}}
     shown = node.cases[node.chosen].where if contacts and isinstance(node, Response) and node.chosen >= 0 else ""
     second = row | {"x": 0.76, "title": {"text": f"at the peak{shown}"}, "font": {"size": 12}}
-    scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
+    scene = space(points.min(axis=0), points.max(axis=0), close=False)
     margin = {"l": 0, "r": 0, "t": 62, "b": 70 if contacts else 10}
     figure.update_layout(scene=scene, margin=margin, legend=legend, legend2=second)
     title = "The mesh and the contact points" if contacts else "The mesh"

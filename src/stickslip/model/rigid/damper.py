@@ -182,6 +182,15 @@ class FlatCurvedDamper:
         lines.append(Line("R", "curved", self.curved_angle, False, self.curved_distance, width))
         return points_of_lines(lines, self.sections, self.length, self.apex)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest y of the prism in metres; without a length every section stands in the middle of its share."""
+        if self.length is not None:
+            return -self.length / 2, self.length / 2
+        first, last = self.sections[0], self.sections[-1]
+        half = (last - first) / (2 * (len(self.sections) - 1)) if len(self.sections) > 1 else self.curved_distance
+        return first - half, last + half
+
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
 

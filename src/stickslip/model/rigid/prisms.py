@@ -120,6 +120,11 @@ class WedgeDamper:
         top = self.top_width / (1 / math.tan(left) + 1 / math.tan(right))
         return top, top + self.height
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest y of the prism, in metres."""
+        return -self.length / 2, self.length / 2
+
     def outline(self) -> FloatArray:
         """Return the section's corners (4, 2) in x and z, metres: top right, base right, base left, top left."""
         left, right = (1 / math.tan(angle) for angle in self.angles)
@@ -198,6 +203,11 @@ class CylinderDamper:
         """(x, z) in metres of the cylinder's axis, one radius from both undersides."""
         normals = [side_frame(angle, left=i == 0)[[0, 2], 2] for i, angle in enumerate(self.angles)]
         return np.asarray(np.linalg.solve(np.array(normals), -self.radius * np.ones(2)))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest y of the prism, in metres."""
+        return -self.length / 2, self.length / 2
 
     def outline(self) -> FloatArray:
         """Return the section as a polygon (k, 2) in x and z, metres."""

@@ -1,9 +1,26 @@
-// draws mode shapes in the page; needs plotly.js and nothing else
-document.querySelectorAll("form.shapes").forEach(form => {
+// moves mode shapes and the motion at the peak in the page; needs plotly.js and nothing else
+const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
+const player = (form, draw) => { // draws at the phase of a form, which its button lets run
+  let playing = false;
+  const step = () => {
+    if (!playing) return;
+    const phase = form.elements.phase;
+    phase.value = (Number(phase.value) + 10) % 360;
+    Promise.resolve(draw()).then(() => requestAnimationFrame(step));
+  };
+  form.addEventListener("input", () => { draw(); });
+  form.addEventListener("submit", event => event.preventDefault());
+  form.elements.play.addEventListener("click", () => {
+    playing = !playing;
+    form.elements.play.textContent = playing ? "stop" : "play";
+    if (playing) step();
+  });
+  draw();
+};
+document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
   const figure = form.closest("figure"), holder = figure.querySelector('script[type="application/json"]');
   const plot = figure.querySelector(".js-plotly-plot");
   const data = JSON.parse(holder.textContent);
-  const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const points = new Float32Array(bytes(data.points)), faces = new Int32Array(bytes(data.faces));
   const wheelPoints = new Int32Array(bytes(data.wheelPoints)), wheelFaces = new Int32Array(bytes(data.wheelFaces));
   const all = Int32Array.from({length: points.length / 3}, (_, n) => n);
@@ -96,19 +113,57 @@ document.querySelectorAll("form.shapes").forEach(form => {
     const done = Plotly.restyle(plot, change, [0]);
     return Object.keys(layout).length ? done.then(() => Plotly.relayout(plot, layout)) : done;
   };
-  let playing = false;
-  const step = () => {
-    if (!playing) return;
-    const phase = form.elements.phase;
-    phase.value = (Number(phase.value) + 10) % 360;
-    Promise.resolve(draw()).then(() => requestAnimationFrame(step));
+  player(form, draw);
+});
+document.querySelectorAll('form.shapes[data-of="motion"]').forEach(form => {
+  const figure = form.closest("figure"), plot = figure.querySelector(".js-plotly-plot");
+  const data = JSON.parse(figure.querySelector('script[type="application/json"]').textContent);
+  const rest = Float32Array.from([...new Float32Array(bytes(data.points)), ...new Float32Array(bytes(data.contacts))]);
+  const edges = new Int32Array(bytes(data.edges)), frames = new Float32Array(bytes(data.frames));
+  const all = rest.length / 3, drawn = bytes(data.points).byteLength / 12, touching = all - drawn;
+  const cache = new Map();
+  const known = name => { // motion and states of a case; none where the page does not hold it
+    if (!cache.has(name) && data.cases[name]) {
+      const own = data.cases[name];
+      cache.set(name, {...own, motion: new Int16Array(bytes(own.motion)), states: new Int8Array(bytes(own.states))});
+    }
+    return cache.get(name);
   };
-  form.addEventListener("input", () => { draw(); });
-  form.addEventListener("submit", event => event.preventDefault());
-  form.elements.play.addEventListener("click", () => {
-    playing = !playing;
-    form.elements.play.textContent = playing ? "stop" : "play";
-    if (playing) step();
+  let chosen = String(data.chosen);
+  const draw = () => {
+    const own = known(chosen), phase = Number(form.elements.phase.value) * Math.PI / 180;
+    const now = rest.slice(), size = Number(form.elements.size.value) / 100;
+    if (own && own.largest) {
+      const scale = size * data.span / own.largest * own.unit;
+      for (let h = 0; h < own.harmonics; h++) {
+        const co = scale * Math.cos((h + 1) * phase), si = scale * Math.sin((h + 1) * phase), first = 6 * all * h;
+        for (let n = 0; n < 3 * all; n++) now[n] += own.motion[first + 2 * n] * co - own.motion[first + 2 * n + 1] * si;
+      }
+    }
+    const axis = (from, count, d) => Float32Array.from({length: count}, (_, n) => now[3 * (from + n) + d]);
+    const lines = (count, at) => [0, 1, 2].map(d => Float32Array.from({length: 3 * count}, (_, n) => n % 3 === 2 ? NaN : at(Math.floor(n / 3), n % 3, d)));
+    const skin = [0, 1, 2].map(d => axis(0, drawn, d)), spots = [0, 1, 2].map(d => axis(drawn, touching, d));
+    const rims = lines(edges.length / 2, (k, end, d) => now[3 * edges[2 * k + end] + d]);
+    const traces = [0, 1, 2, 3], places = [skin, skin, rims, spots], shown = form.elements.frames && form.elements.frames.checked;
+    if (shown) [0, 1, 2].forEach(k => {
+      traces.push(4 + k);
+      places.push(lines(touching, (c, end, d) => now[3 * (drawn + c) + d] + end * data.frameLength * frames[9 * c + 3 * d + k]));
+    });
+    const change = {};
+    ["x", "y", "z"].forEach((name, d) => { change[name] = places.map(own => own[d]); });
+    const at = own ? Math.floor(phase / (2 * Math.PI) * own.states.length / touching) % (own.states.length / touching) : 0;
+    const states = own ? Int8Array.from({length: touching}, (_, c) => own.states[c * own.states.length / touching + at]) : new Int8Array(touching);
+    return Plotly.restyle(plot, change, traces)
+      .then(() => Plotly.restyle(plot, {"marker.color": [states]}, [3]))
+      .then(() => Plotly.restyle(plot, {visible: Boolean(shown)}, [4, 5, 6]));
+  };
+  if (form.elements.view) form.elements.view.addEventListener("change", () => {
+    Plotly.relayout(plot, data.views[form.elements.view.value]);
   });
-  draw();
+  const section = form.closest("section");
+  if (section) section.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {
+    chosen = button.dataset.case;
+    draw();
+  }));
+  player(form, draw);
 });

@@ -22,6 +22,7 @@ from stickslip.analyses.forced_response.page.curves import abscissa, frequency_r
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
 from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
+from stickslip.analyses.forced_response.page.motion import in_motion
 from stickslip.analyses.forced_response.page.optimisation import optimisation, what_is_needed, where_friction_works
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.forced_response.page.wheel import (
@@ -250,7 +251,7 @@ SECTION: Section = Section(
         Block(
             "contact",
             "Contacts at the peak",
-            (chosen_case, state_map, surface_map, hysteresis_t, hysteresis_w, energy, bodies),
+            (chosen_case, in_motion, state_map, surface_map, hysteresis_t, hysteresis_w, energy, bodies),
         ),
         Block("cases", "Cases", (peaks,), folded=True),
         Block(

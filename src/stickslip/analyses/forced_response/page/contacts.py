@@ -11,7 +11,7 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.cases import CASE, ShownCase
 from stickslip.report.content import Chooser, chooser
-from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
+from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, legend_above, styled
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.tiles import outlines, patches
 
@@ -23,7 +23,6 @@ _MOST_ROW = 4  # of them beside each other, where contact lines have more points
 _MOST_STATES = 40  # rows with a name of their own
 _MOST_SAMPLES = 40_000  # of all loops of a figure, and of all rows of states
 _FEWEST_SAMPLES = 32  # of a period
-_STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
 
 
 def chosen_case(response: Response) -> Chooser | None:
@@ -87,7 +86,7 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
     closed = np.append(np.arange(len(gap)), 0)
     colour: dict[str, object] = {"color": MUTED}
     if state is not None:
-        colour = {"color": state[closed].astype(np.int8), "colorscale": _STATE_SCALE, "cmin": -0.5, "cmax": 2.5}
+        colour = {"color": state[closed].astype(np.int8), "colorscale": STATE_SCALE, "cmin": -0.5, "cmax": 2.5}
     return go.Scatter(
         x=gap[closed].astype(np.float32),
         y=force[closed].astype(np.float32),
@@ -273,7 +272,7 @@ def state_map(response: Response) -> Plot | None:
             z=values.astype(np.int8),
             zmin=-0.5,
             zmax=2.5,
-            colorscale=_STATE_SCALE,
+            colorscale=STATE_SCALE,
             showscale=False,
             ygap=2 if len(rows) <= _MOST_STATES else 0,
             meta=case.index,

@@ -211,6 +211,44 @@ class ModelFacts:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Drawn:
+    """What pictures show of the model, and its motion at the peak."""
+
+    drawn_point: FloatArray = column(
+        "m",
+        "points of the surfaces in pictures: some nodes of meshes, rigid bodies, cubes at nodes without a mesh and at lumped masses, which stand in a row 1 m apart",
+        along="case drawn_node xyz",
+    )
+    drawn_triangle: IntArray | None = column("1", "triangles between them", along="drawn_face corner", default=None)
+    drawn_part: TextArray | None = column("1", "part of each point", along="drawn_node", default=None)
+    drawn_kind: TextArray | None = column(
+        "1", "what it is drawn from: mesh, section, contact faces, node or mass", along="drawn_node", default=None
+    )
+    drawn_contact: FloatArray = column("m", "places of the contact points in pictures", along="contact xyz")
+    drawn_load: TextArray | None = column("1", "name of a load with a place", along="drawn_load", default=None)
+    drawn_load_harmonic: IntArray | None = column(
+        "1", "its harmonic, 0 for a static load", along="drawn_load", default=None
+    )
+    drawn_load_point: FloatArray | None = column("m", "where it acts", along="drawn_load xyz", default=None)
+    drawn_load_direction: FloatArray | None = column(
+        "1", "unit vector of its direction", along="drawn_load xyz", default=None
+    )
+    drawn_support: FloatArray | None = column(
+        "m", "points that are held, of those that are drawn", along="drawn_support xyz", default=None
+    )
+    peak_drawn_motion: FloatArray = column(
+        "m",
+        "displacement of the drawn points at the peak in the first harmonics from 1 on, without the mean; NaN where it was not recovered: above 60 000 degrees of freedom, for wheels whose sectors differ, without a peak",
+        along="case drawn_harmonic drawn_node xyz part",
+    )
+    peak_contact_motion: FloatArray = column(
+        "m",
+        "the same of the contact points, each on its first surface",
+        along="case drawn_harmonic contact xyz part",
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class KnownVerdicts:
     """Verdicts that need the model; the job stores them."""
 
@@ -564,6 +602,7 @@ KINDS = (
     PeakPeriod,
     Attempts,
     ModelFacts,
+    Drawn,
     KnownVerdicts,
     Verdicts,
     PointStability,

@@ -22,6 +22,8 @@ COUNTED = (
     "motion_harmonic",
     "sample",
     "mode",
+    "drawn_node",
+    "drawn_harmonic",
 )  # dimensions that may be longer in one case than in another
 AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
 

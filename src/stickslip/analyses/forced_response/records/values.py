@@ -13,6 +13,7 @@ from stickslip.analyses.forced_response.records.columns import (
     STAGES,
     Attempts,
     CaseNumbers,
+    Drawn,
     ExaminedRows,
     ModelFacts,
     MoreHarmonics,
@@ -101,6 +102,7 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
         | _of_points(question, response)
         | _of_fields(question, response)
         | _of_peak(question, response)
+        | _of_drawn(question, response)
         | _of_attempts(question, response)
     )
 
@@ -261,6 +263,33 @@ def _of_peak(question: Question, response: Response) -> Values:
     period = signals(question.problem, response.top.point)
     return stored(
         PeakPeriod(peak_time=period.time, peak_gap=period.gap, peak_force=period.force, peak_state=period.state)
+    )
+
+
+def _of_drawn(question: Question, response: Response) -> Values:
+    """Return what pictures show of the model, and its motion at the peak."""
+    scene, top = question.scene, response.top
+    if scene is None or not len(scene.points):
+        return {}
+    count, contacts = (1, len(scene.points), 3), (1, len(scene.contacts), 3)
+    moved, of_contacts = (np.full(shape, complex(np.nan, np.nan)) for shape in (count, contacts))
+    if scene.moving is not None and top is not None:
+        moved, of_contacts = scene.moving.at(top.point.omega, top.point.coefficients)
+    return stored(
+        Drawn(
+            drawn_point=scene.points,
+            drawn_triangle=scene.triangles,
+            drawn_part=scene.part,
+            drawn_kind=scene.kind,
+            drawn_contact=scene.contacts,
+            drawn_load=scene.load,
+            drawn_load_harmonic=scene.load_harmonic,
+            drawn_load_point=scene.load_points,
+            drawn_load_direction=scene.load_directions,
+            drawn_support=scene.supports,
+            peak_drawn_motion=np.stack([moved.real, moved.imag], axis=-1),
+            peak_contact_motion=np.stack([of_contacts.real, of_contacts.imag], axis=-1),
+        )
     )
 
 
