@@ -239,6 +239,16 @@ def test_a_legend_stands_below_its_panel_on_a_narrow_screen(
     )
     assert (legend["left"] >= panel["right"]) is beside
     assert (legend["top"] >= panel["bottom"]) is not beside
+    if not beside:  # the figure has grown: axis title above, caption below the legend
+        title, caption = (
+            browser.run(f"document.querySelector('#fig-response {part}').getBoundingClientRect().toJSON()")
+            for part in (".xtitle", "figcaption")
+        )
+        browser.until(
+            "document.querySelector('#plot-response .legend').getBoundingClientRect().top >= "
+            "document.querySelector('#plot-response .xtitle').getBoundingClientRect().bottom"
+        )
+        assert title["bottom"] < caption["top"]
 
 
 def test_page_is_one_small_file_without_network(page: Path) -> None:

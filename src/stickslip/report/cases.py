@@ -1,12 +1,13 @@
 """Cases of [vary]: their names and colours on the page."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from stickslip.report.plot import ramp
-from stickslip.study.varied import assigned_of, first_varied_number, varied_values
+from stickslip.study.varied import assigned_of, families, first_varied_number, key_name, varied_values
 
 CASE = "case"  # heading of legends and columns
 
@@ -63,6 +64,19 @@ def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
     """Return the first varied key whose values are numbers, and its values (case,); NaN if there is none."""
     key, values = first_varied_number(data)
     return key, values
+
+
+def axis_name(data: xr.Dataset, key: str) -> str:
+    """Return a varied key as the title of an axis: ``force (N)``."""
+    word, unit = key_name(data, key)
+    return f"{word} ({unit})" if unit else word
+
+
+def families_of(data: xr.Dataset, key: str, cases: Sequence[ShownCase]) -> dict[str, list[ShownCase]]:
+    """Group some cases as `study.varied.families` does, each group by rising values; groups without a case are left out."""
+    own = {case.index: case for case in sorted(cases, key=lambda c: c.value)}
+    groups = {name: [own[k] for k in own if k in members] for name, members in families(data, key).items()}
+    return {name: group for name, group in groups.items() if group}
 
 
 def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:

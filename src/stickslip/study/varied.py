@@ -1,12 +1,12 @@
 """The varied keys of a study, from the dataset of an analysis."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray
-from stickslip.study.file.case_names import assignments
+from stickslip.study.file.case_names import JOINT, assignments, key_words
 
 
 def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
@@ -37,11 +37,47 @@ def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
     return "", np.full(len(values), np.nan)
 
 
-def other_values(data: xr.Dataset, key: str) -> list[str]:
-    """Return the other varied keys of each case with their values; empty if there are none."""
+def key_name(data: xr.Dataset, key: str) -> tuple[str, str]:
+    """Return word and unit of a varied key, as names of cases tell it: ``force``, ``N``."""
+    keys = varied_values(data)[0]
+    return key_words(keys if key in keys else [key])[key]
+
+
+def families(data: xr.Dataset, key: str) -> dict[str, list[int]]:
+    """Group the cases that differ in `key` and in keys that run with it: name of a group -> its cases in the order of the study.
+
+    The name has the parts of the cases' names that the group shares; it is empty for a single group. A key runs with `key` if each value
+    of `key` has one of its values, and if numbers rise or fall together.
+    """
     keys, values = varied_values(data)
-    rows = [{k: v for k, v in zip(keys, row, strict=True) if k != key} for row in values]
-    return [", ".join(assigned_of(row)) for row in rows]
+    along = values[:, keys.index(key)] if key in keys else np.zeros(len(values))
+    free = [k for k, name in enumerate(keys) if name != key and not _runs_with(along, values[:, k])]
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for case, row in enumerate(values[:, free]):
+        groups.setdefault(tuple(row), []).append(case)
+    spelled = [JOINT.join(assigned_of({keys[k]: v for k, v in zip(free, row, strict=True)})) for row in groups]
+    labels = [str(v) for v in data["case_label"].values] if "case_label" in data else []
+    shared = _shared_names(labels, list(groups.values()))
+    return dict(zip(shared if len(set(shared)) == len(groups) else spelled, groups.values(), strict=True))
+
+
+def _runs_with(along: np.ndarray, other: np.ndarray) -> bool:
+    pairs = set(zip(along, other, strict=True))
+    if len(pairs) > len(set(along)):
+        return False
+    numbers = np.array(sorted((as_number(a), as_number(b)) for a, b in pairs))
+    steps = np.diff(numbers[:, 1])
+    return bool(np.isnan(numbers).any() or (steps >= 0).all() or (steps <= 0).all())
+
+
+def _shared_names(labels: Sequence[str], groups: Sequence[Sequence[int]]) -> list[str]:
+    """Return the parts of names that all cases of a group have, a text for each group."""
+    if len(groups) == 1 or not labels:
+        return [""]
+    parts = [label.split(JOINT) for label in labels]
+    places = range(min(map(len, parts)))
+    own = [k for k in places if all(len({parts[c][k] for c in cases}) == 1 for cases in groups)]
+    return [JOINT.join(parts[cases[0]][k] for k in own) for cases in groups]
 
 
 def assigned_of(values: Mapping[str, object]) -> tuple[str, ...]:

@@ -10,11 +10,10 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
 from stickslip.analyses.forced_response.page.curves import DASHES
-from stickslip.analyses.forced_response.page.optimisation import families
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import Chapter, Placing, page_html
 from stickslip.report.plot import INK, MUTED, Plot, log_ticks, styled
@@ -174,7 +173,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     figure, heights = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38]), []
     curves = []
     for design, response in told:
-        groups = families(sorted(response.peaked, key=lambda c: c.value), key)
+        groups = families_of(response.data, key, response.peaked)
         for k, (others, cases) in enumerate(groups.items()):
             peak = np.array([_peak(response, c, divided=divided) for c in cases])
             heights.append(peak)
@@ -202,13 +201,13 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     every = [value for _, _, own, _, _ in curves for value in own]
     wide = min(every) > 0 and max(every) > 5 * min(every)
     figure.update_xaxes(type="log" if wide else "linear")
-    figure.update_xaxes(title_text=key, row=2)
+    figure.update_xaxes(title_text=axis_name(told[0][1].data, key), row=2)
     drawn = scale.factor * np.concatenate(heights)
     over = " / force" if divided else ""
     figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), row=1)
     figure.update_yaxes(title_text="peak frequency (Hz)", row=2)
     lowest = min(((float(np.nanmin(p)), n, v[int(np.nanargmin(p))]) for n, _, v, p, _ in curves), key=lambda t: t[0])
-    caption = f"Peak and its frequency over {key}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
+    caption = f"Peak and its frequency over {axis_name(told[0][1].data, key)}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
 

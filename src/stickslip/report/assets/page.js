@@ -1,18 +1,30 @@
-document.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {
-  const chosen = button.dataset.case, section = button.closest("section");
-  section.querySelectorAll(".chooser button").forEach(
-    other => other.setAttribute("aria-pressed", String(other === button)));
+const choose = (section, chosen) => {
   section.querySelectorAll("div[data-case], span[data-case]").forEach(part => { part.hidden = part.dataset.case !== chosen; });
   section.querySelectorAll("div[data-case]:not([hidden]) .js-plotly-plot").forEach(plot => Plotly.Plots.resize(plot));
   section.querySelectorAll("figure.by-case .js-plotly-plot").forEach(plot => {
     Plotly.restyle(plot, {visible: plot.data.map(t => t.meta === undefined || String(t.meta) === chosen)});
   });
+};
+document.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {
+  const section = button.closest("section");
+  section.querySelectorAll(".chooser button").forEach(
+    other => other.setAttribute("aria-pressed", String(other === button)));
+  choose(section, button.dataset.case);
 }));
-// on a narrow screen a legend beside the panel would leave it half the width
+document.querySelectorAll(".chooser select").forEach(list => list.addEventListener(
+  "change", () => choose(list.closest("section"), list.value)));
+// on a narrow screen a legend beside the panel would leave it half the width: it stands below, and the figure grows by its height
 if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
-  const legend = (plot._fullLayout || {}).legend || {}; // what a template says stands nowhere else
+  const whole = plot._fullLayout || {}, legend = whole.legend || {}; // what a template says stands nowhere else
   if (plot.closest(".panels") || !(legend.x > 1)) return;
-  Plotly.relayout(plot, {"legend.orientation": "h", "legend.x": 0, "legend.y": -0.16, "legend.yanchor": "top"});
+  const below = {orientation: "h", x: 0, xref: "container", y: 0, yref: "container", yanchor: "bottom"};
+  const change = Object.fromEntries(Object.entries(below).map(([name, value]) => ["legend." + name, value]));
+  Plotly.relayout(plot, change).then(() => {
+    const drawn = plot.querySelector(".legend");
+    const more = drawn ? drawn.getBoundingClientRect().height + 12 : 0;
+    [plot, plot.parentElement].forEach(own => { own.style.height = `${whole.height + more}px`; });
+    Plotly.relayout(plot, {height: whole.height + more, "margin.b": whole.margin.b + more});
+  });
 });
 // a figure in what was folded away has no width until it is opened
 document.querySelectorAll("details").forEach(folded => folded.addEventListener("toggle", () => {

@@ -30,7 +30,13 @@ def short_names(tables: Sequence[Sequence[Values]]) -> dict[str, Naming]:
     tables
         For each table of [vary] its rows of values.
     """
-    keys = [key for rows in tables for key in _telling(rows)]
+    words = key_words([key for rows in tables for key in _telling(rows)])
+    column = {key: [row[key] for row in rows] for rows in tables for key in _telling(rows)}
+    return {key: Naming(word, unit, _digits(column[key])) for key, (word, unit) in words.items()}
+
+
+def key_words(keys: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return word and unit of each key: ``load.shaker.force_n`` -> ``force``, ``N``; of keys with one word also the tables above."""
     split = {key: split_units(key.rpartition(".")[2]) for key in keys}
     words = {key: own.replace("_", " ") for key, (own, _) in split.items()}
     above = 1
@@ -39,8 +45,7 @@ def short_names(tables: Sequence[Sequence[Values]]) -> dict[str, Naming]:
         doubled = [key for key in keys if list(words.values()).count(words[key]) > 1]
         for key in doubled:
             words[key] = " ".join((*key.split(".")[-above:-1], split[key][0])).replace("_", " ")
-    column = {key: [row[key] for row in rows] for rows in tables for key in _telling(rows)}
-    return {key: Naming(words[key], split[key][1], _digits(column[key])) for key in keys}
+    return {key: (words[key], split[key][1]) for key in keys}
 
 
 def short_name(values: Values, names: Mapping[str, Naming]) -> str:

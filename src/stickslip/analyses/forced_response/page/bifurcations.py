@@ -1,5 +1,7 @@
 """Bifurcations of the response on the page: marks on its curves, side branches, and a table."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 
@@ -20,21 +22,22 @@ SYMBOLS = {
 }
 
 
-def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str:
-    """Draw the bifurcations of a response and its side branches; return the sentence for the caption, empty for none.
+def mark_bifurcations(figure: go.Figure, response: Response, cases: Sequence[ShownCase], over: float) -> None:
+    """Draw the bifurcations of some cases and their side branches.
 
     Parameters
     ----------
     figure, response
         The figure of the curves, and their response.
+    cases
+        The cases that the figure shows.
     over
         Abscissa of a frequency of 1 Hz.
     """
-    found = response.rows(BifurcationRows)
-    if not found:
-        return ""
-    branches = sum(_branches(figure, response, case, over) for case in response.cases)
-    if branches:
+    shown = {case.index for case in cases}
+    found = [(case, own) for case, own in response.rows(BifurcationRows) if case.index in shown]
+    drawn = [_branches(figure, response, case, over) for case in cases] if found else []
+    if any(drawn):
         figure.add_trace(key_marker("branch that leaves (dotted)", "line-ew", "bifurcations"))
     kinds = [str(own.bifurcation_kind) for _, own in found]
     for kind in SYMBOLS:
@@ -42,8 +45,17 @@ def mark_bifurcations(figure: go.Figure, response: Response, over: float) -> str
             figure.add_trace(
                 _marks(response, kind, [own for own, k in zip(found, kinds, strict=True) if k == kind], over)
             )
+
+
+def located(response: Response) -> str:
+    """Return the sentence of a caption on the bifurcations of all cases; empty for none."""
+    kinds = [str(own.bifurcation_kind) for _, own in response.rows(BifurcationRows)]
+    if not kinds:
+        return ""
     counts = [counted(kinds.count(kind), kind) for kind in SYMBOLS if kind in kinds]
     told = f" Located on the branch: {', '.join(counts)}." if counts else ""
+    sides = [read(SidePoints, response.data, case.index).side_point_branch for case in response.cases]
+    branches = sum(np.unique(side).size for side in sides)
     if branches:
         told += f" Dotted: {branches} that leave{'s' * (branches == 1)} there."
     return told

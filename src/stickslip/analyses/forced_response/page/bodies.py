@@ -6,6 +6,7 @@ from markupsafe import Markup
 from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.curves import abscissa
+from stickslip.analyses.forced_response.page.many_cases import FEW, extremes
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import CASE, ShownCase
@@ -138,7 +139,7 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
     names, colours = response.labels("contact"), group_colours(response)
     bars = {group: (colours[group], [names[k] for k in at], at) for group, at in response.groups.items()}
     for case in response.cases:
-        peak, at = response.peak(case), response.points(case)
+        peak = response.peak(case)
         for group, (bar, x, members) in bars.items() if peak >= 0 else ():
             figure.add_bar(
                 x=x,
@@ -152,7 +153,9 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
                 row=1,
                 col=1,
             )
-        line = {"color": case.colour, "width": 1.6}
+    named = response.cases if len(response.cases) <= FEW else extremes(response)
+    for case in named:
+        at, line = response.points(case), {"color": case.colour, "width": 1.6}
         y = np.where(total[at] > 0, total[at], np.nan)
         curve = go.Scatter(x=abscissa(response)[0][at], y=y, mode="lines", name=case.short, line=line)
         figure.add_trace(curve.update(showlegend=len(response.cases) > 1), 1, 2)
@@ -165,6 +168,7 @@ def energy(response: Response) -> Plot | None:
         return None
     total = np.where(response.converged, np.nansum(values, axis=1), np.nan)
     total = np.where(total < _NOTHING, 0.0, total)
+    values = np.where(np.abs(values) < _NOTHING, 0.0, values)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")
     _, over, unit = abscissa(response)
     titles = ("at the peak, by contact point", f"all contacts, against {over}")
@@ -182,8 +186,9 @@ def energy(response: Response) -> Plot | None:
     key = Markup(", ").join(
         Markup('<b style="color:{}">{}</b>').format(c, g) for g, c in group_colours(response).items()
     )
-    told = Markup("Work of the friction forces in one cycle. Left: coloured by contact ({}). {}")
-    caption = told.format(key, _widest_range(response, total))
+    named = "" if len(response.cases) <= FEW else "Right: the smallest, the middle and the largest peak. "
+    told = Markup("Work of the friction forces in one cycle. Left: coloured by contact ({}). {}{}")
+    caption = told.format(key, named, _widest_range(response, total))
     captions = {c.index: _energy_caption(response, c) for c in response.peaked}
     title = "Energy dissipated in a cycle"
     return Plot("energy", title, caption, figure, captions, response.chosen)

@@ -33,8 +33,10 @@ from stickslip.analyses.forced_response.page.wheel import (
     wheel_in_motion,
 )
 from stickslip.analyses.forced_response.records.columns import CaseNumbers
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.working_range import loss_at_peak
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.content import Table
 from stickslip.report.quantities import (
     NONE,
@@ -49,6 +51,8 @@ from stickslip.report.quantities import (
 )
 from stickslip.report.section import Block, Card, Section
 from stickslip.study.verdict import LEVELS
+
+_ALIKE = 0.01  # of the largest peak: so near each other peaks do not tell cases apart
 
 
 def _answer(response: Response) -> Card:
@@ -69,9 +73,13 @@ def _answer(response: Response) -> Card:
     else:
         which = f"{len(trusted)} {LEVELS[least]} of " * (len(trusted) < len(counted_in))
         kind = "peak per newton" if response.per_force else "peak"
-        label = f"with {best.label}, the smallest {kind} of {which}{counted(len(counted_in), 'case')}"
         share = peaks[best] / max(peaks.values())
+        alike = f", and none is {percent(100 * _ALIKE)} larger" * (share > 1 - _ALIKE)
+        label = f"with {best.label}, the smallest {kind} of {which}{counted(len(counted_in), 'case')}{alike}"
         told.append(f"{ratio}{percent(100 * float(share))} of the largest, {response.peak_is(best)}")
+    idle = all(loss_at_peak(Curve(response.data, c.index)) == 0 for c in counted_in)
+    if idle:
+        told.append(f"Friction dissipates nothing at {'any' if len(counted_in) > 1 else 'the'} peak")
     if not within:
         told.append("The largest amplitude stands at the end of the sweep: no resonance")
     elif len(within) < len(cases):
@@ -80,7 +88,7 @@ def _answer(response: Response) -> Card:
     if peaks[lower] < peaks[best]:
         told.append(f"{_size(response, lower)} is {response.level(lower)}{lower.where}")
     value = f"{_size(response, best)} at {response.place(best)}{response.blade_at_peak(best)}"
-    return Card(value, label, ". ".join([*told, *_next(response, best)]) + ".")
+    return Card(value, label, ". ".join([*told, *_next(response, best, idle=idle)]) + ".")
 
 
 def _size(response: Response, case: ShownCase) -> str:
@@ -88,17 +96,18 @@ def _size(response: Response, case: ShownCase) -> str:
     return amplitude(response.peak_response(case) * (case.excitation if response.per_force else 1.0), response.length)
 
 
-def _next(response: Response, best: ShownCase) -> list[str]:
+def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
     """Return what to do next: settle a doubt, sweep farther, compute beyond the last value, or between the neighbours."""
     if response.trust(best):
         return [f"Next: settle why it is {response.level(best)}, see above"]
     if not response.resonates(best):
         return ["Next: sweep over a wider range"]
+    if idle:
+        return ["Next: press the contacts less or excite more, until they slip"]
     key = first_number(response.data)[0]
     if not key:
         return [] if len(response.cases) > 1 else ["Next: vary the load or the damper with [vary]"]
-    own = {text for text in best.assigned if not text.startswith(f"{key} = ")}
-    family = sorted((c for c in response.peaked if own <= set(c.assigned)), key=lambda c: c.value)
+    family = next(own for own in families_of(response.data, key, response.peaked).values() if best in own)
     at = family.index(best)
     if at in (0, len(family) - 1):
         return [f"Next: compute beyond {best.label}, a smaller one may lie there"] if len(family) > 1 else []

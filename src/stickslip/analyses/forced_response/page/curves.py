@@ -1,12 +1,15 @@
 """Figures of the response: curves of all cases, of each engine order, and low against accepted order."""
 
+from collections.abc import Sequence
 from html import escape
 from textwrap import wrap
 
 import numpy as np
 import plotly.graph_objects as go
+from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.bifurcations import mark_bifurcations
+from stickslip.analyses.forced_response.page.bifurcations import located, mark_bifurcations
+from stickslip.analyses.forced_response.page.many_cases import Panel, extremes, panels
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.tractions import draw_bands
 from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
@@ -48,7 +51,7 @@ def abscissa(response: Response) -> tuple[FloatArray, str, str]:
     return response.hz, "frequency", "Hz"
 
 
-def _curve(response: Response, case: ShownCase) -> go.Scatter:
+def _curve(response: Response, case: ShownCase, name: str) -> go.Scatter:
     at, scale = response.points(case), response.scale
     x, _, unit = abscissa(response)
     high = response.more[at]
@@ -62,7 +65,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
         x=x[at],
         y=response.accepted[at] * scale.factor,
         mode="markers" if response.unstable[at].any() else "lines+markers",
-        name=case.short if len(response.cases) > 1 else "response",
+        name=name if len(response.cases) > 1 else "response",
         legendgroup="cases",
         legendgrouptitle={"text": CASE} if len(response.cases) > 1 else None,
         line={"color": case.colour, "width": 1.6},
@@ -121,9 +124,9 @@ def _wrapped(text: str) -> str:
     return "<br>".join(escape(line) for line in wrap(text, 80))
 
 
-def _failures(response: Response) -> go.Scatter:
-    """Draw crosses at unconverged points: at their amplitude if it is known, else at the bottom."""
-    at = np.flatnonzero(~response.converged)
+def _failures(response: Response, cases: Sequence[ShownCase]) -> go.Scatter:
+    """Draw crosses at unconverged points of some cases: at their amplitude if it is known, else at the bottom."""
+    at = np.flatnonzero(~response.converged & np.isin(response.point_case, [c.index for c in cases]))
     values = response.response() * response.scale.factor
     good = values[response.converged & np.isfinite(values)]
     floor = float(good.min()) if good.size else 1.0
@@ -190,15 +193,81 @@ def _caption(response: Response) -> str:
     return text
 
 
+def _in_panels(response: Response, shown: Sequence[Panel]) -> tuple[go.Figure, str]:
+    """Draw the curves of each panel; return the figure and the sentence about residual tractions."""
+    across = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 3
+    down = -(-len(shown) // across)
+    titles = [panel.title for panel in shown] if len(shown) > 1 else None
+    shared = {
+        "shared_xaxes": True,
+        "shared_yaxes": True,
+        "horizontal_spacing": 0.03,
+        "vertical_spacing": 0.22 / down**1.3,
+    }
+    figure = make_subplots(down, across, subplot_titles=titles, **shared) if len(shown) > 1 else go.Figure()
+    told, named = "", set[tuple[str, str]]()
+    for k, panel in enumerate(shown):
+        part = go.Figure()
+        said = _draw(part, response, panel)
+        told = max(told, said, key=len)  # a band in any panel outweighs equal bounds in another
+        place = {"row": k // across + 1, "col": k % across + 1} if len(shown) > 1 else {}
+        for trace in part.data:
+            own = str(trace.legendgroup), str(trace.name)
+            if own in named:
+                trace.showlegend = False
+            named.add(own)
+            figure.add_trace(trace, **place)
+    return figure, told
+
+
+def _draw(figure: go.Figure, response: Response, panel: Panel) -> str:
+    """Draw the cases of a panel with all their marks; return the sentence about residual tractions."""
+    banded = draw_bands(figure, response, panel.cases)
+    pairs = zip(panel.cases, panel.names, strict=True)
+    figure.add_traces([_curve(response, case, name) for case, name in pairs])
+    figure.add_traces([line for case in panel.cases for line in _lines(response, case)])
+    failed = _failures(response, panel.cases)
+    if len(failed.x):
+        figure.add_trace(failed)
+    over = float(np.nanmean(abscissa(response)[0] / response.hz))
+    mark_bifurcations(figure, response, panel.cases, over)
+    return banded
+
+
+def _others(response: Response, named: Sequence[ShownCase]) -> go.Scatter:
+    """Return the curves of all other cases as thin lines without names."""
+    x, _, unit = abscissa(response)
+    rest = [c for c in response.cases if c.index not in {own.index for own in named}]
+    rows = [(c, response.points(c)) for c in rest]
+    gap = [np.nan]
+    return go.Scatter(
+        x=np.concatenate([np.append(x[at], gap) for _, at in rows]),
+        y=np.concatenate([np.append(response.accepted[at] * response.scale.factor, gap) for _, at in rows]),
+        text=[c.named for c, at in rows for _ in range(at.size + 1)],
+        mode="lines",
+        name=f"{len(rest)} other cases",
+        line={"color": "#b4bcc6", "width": 0.8},
+        hovertemplate=f"%{{text}}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {response.scale.unit}<extra></extra>",
+    )
+
+
+def _many(response: Response) -> tuple[go.Figure, str]:
+    """Draw three cases by name and the others without; return the figure and the sentence about it."""
+    chosen = extremes(response) or response.cases[:1]
+    figure = go.Figure(_others(response, chosen))
+    _draw(figure, response, Panel("", chosen, tuple(c.short for c in chosen)))
+    return figure, f" Named: the smallest, the middle and the largest peak of {len(response.cases)} cases."
+
+
 def frequency_response(response: Response) -> Plot | None:
-    """Draw the responses of all cases, marked by the harmonics of each point (Gastaldi and Berruti 2017, fig. 4b)."""
+    """Draw the responses of all cases, marked by the harmonics of each point (Gastaldi and Berruti 2017, fig. 4b).
+
+    More cases than a panel can name are drawn in panels; still more as lines of which three are named.
+    """
     if not np.isfinite(response.accepted).any():
         return None
-    scale = response.scale
-    figure = go.Figure()
-    banded = draw_bands(figure, response)
-    figure.add_traces([_curve(response, case) for case in response.cases])
-    figure.add_traces([line for case in response.cases for line in _lines(response, case)])
+    scale, shown = response.scale, panels(response)
+    figure, told = _in_panels(response, shown) if shown else _many(response)
     if response.decides:
         low, more = response.low_name, response.more_name
         figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))
@@ -206,18 +275,21 @@ def frequency_response(response: Response) -> Plot | None:
     for level, word, symbol in ((1, "doubtful", "circle-open"), (2, "wrong", "x")):
         if np.any(response.converged & (response.levels == level)):
             figure.add_trace(key_marker(word, symbol, "key"))
-    if not response.converged.all():
-        figure.add_trace(_failures(response))
-    x, name, unit = abscissa(response)
-    marked = mark_bifurcations(figure, response, float(np.nanmean(x / response.hz)))
-    styled(figure, 500)
+    _, name, unit = abscissa(response)
+    rows = -(-len(shown) // (2 if len(shown) <= 4 else 3)) if len(shown) > 1 else 1
+    height = max(500, 150 + 210 * rows)
+    styled(figure, height)
     buttons = _scale_buttons(logarithmic=True)
+    if len(shown) > 1:  # above the titles of panels
+        buttons[0]["y"] = 1 + 30 / height
+        figure.update_layout(margin_t=80)
     figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
-    figure.update_xaxes(title_text=f"{name} ({unit})")
+    figure.update_xaxes(title_text=f"{name} ({unit})", row=rows if rows > 1 else None)
     ticks = log_ticks(response.accepted * scale.factor)
-    figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", type="log", **ticks)
+    figure.update_yaxes(type="log", **ticks)
+    figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", col=1 if len(shown) > 1 else None)
     title = "Frequency response of all cases" if len(response.cases) > 1 else "Frequency response"
-    return Plot("response", title, _caption(response) + marked + banded, figure)
+    return Plot("response", title, _caption(response) + located(response) + told, figure)
 
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash")

@@ -7,14 +7,15 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from stickslip.analyses.forced_response.page.many_cases import FEW, all_peaks
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.tractions import draw_peak_bands
 from stickslip.analyses.forced_response.verdicts.working_range import MIN_PEAKS, TITLE, range_lines, working_ranges
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.model.readers.measured_columns import same
-from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
 from stickslip.report.content import Words
-from stickslip.report.plot import GRID, INK, MUTED, Plot, log_ticks, styled
+from stickslip.report.plot import GRID, INK, MUTED, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
 
 SURE = {"standard deviation": 2.0, "half-width": 1.0}  # bars within which a computed peak agrees
@@ -185,7 +186,7 @@ def what_is_needed(response: Response) -> Words | None:
     key, n = first_number(response.data)[0], len(response.cases)
     if not key or n >= MIN_PEAKS:
         return None
-    text = f"Curves over {key}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
+    text = f"Curves over {axis_name(response.data, key)}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
     return Words((text,))
 
 
@@ -234,40 +235,35 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
     )
 
 
-def families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
-    """Group cases by all varied keys except `key`; each group is a curve."""
-    found: dict[str, list[ShownCase]] = {}
-    for case in cases:
-        others = ", ".join(t for t in case.assigned if not t.startswith(f"{key} = "))
-        found.setdefault(others, []).append(case)
-    return found
-
-
 def optimisation(response: Response) -> Plot | None:
-    """Draw peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
+    """Draw peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9); of too many curves a map."""
     key = first_number(response.data)[0]
     known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
     cases = sorted(known, key=lambda c: c.value)
     measured = measured_of(response, key)
     if not key or len(cases) < (1 if measured else MIN_PEAKS):
         return None
+    curves_of = families_of(response.data, key, cases)
+    if len(curves_of) > FEW:
+        return all_peaks(response, key, curves_of, _optimum_caption(response, cases))
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
     figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38])
-    curves_of = families(cases, key)
     banded = [draw_peak_bands(figure, response, own, scale.factor) for own in curves_of.values()]
-    for name, family in curves_of.items():
+    colours = ramp(len(curves_of)) if len(curves_of) > 1 else [MUTED]
+    for (name, family), line in zip(curves_of.items(), colours, strict=True):
         edge = {"width": 1, "color": "white"}
-        mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
+        mark = {"size": 10, "color": [c.colour for c in family] if line == MUTED else line, "line": edge}
         curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
         for row, (unit, y) in enumerate(curves, 1):
             figure.add_scatter(
                 x=[c.value for c in family],
                 y=y,
                 mode="lines+markers",
-                line={"color": MUTED, "width": 1.3},
+                line={"color": line, "width": 1.3},
                 marker=mark,
                 name=name,
+                legendgroup=name,
                 showlegend=row == 1 and len(curves_of) > 1,
                 text=[c.named for c in family],
                 hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>",
@@ -280,7 +276,7 @@ def optimisation(response: Response) -> Plot | None:
     values = np.unique([c.value for c in cases])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
     ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
-    figure.update_xaxes(title_text=key, row=2)
+    figure.update_xaxes(title_text=axis_name(response.data, key), row=2)
     figure.update_xaxes(type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
     drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
     figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), row=1)

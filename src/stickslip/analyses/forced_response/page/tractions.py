@@ -1,5 +1,7 @@
 """Bounds over residual tractions as a band on the figures of the forced response."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
@@ -42,12 +44,12 @@ def _of(response: Response, case: ShownCase, name: str) -> FloatArray:
     return np.asarray(response.data[f"{_PREFIX}{name}"].values[case.index], dtype=float)
 
 
-def draw_bands(figure: go.Figure, response: Response) -> str:
-    """Draw the band of each case behind its curve; return the sentence for the caption, empty for none."""
+def draw_bands(figure: go.Figure, response: Response, cases: Sequence[ShownCase]) -> str:
+    """Draw the band of each of the cases behind its curve; return the sentence for the caption, empty for none."""
     if not _has(response) or response.has("speed_rpm"):
         return ""
     drawn = False
-    for case in response.cases:
+    for case in cases:
         hertz, least, most = (
             _of(response, case, name) for name in ("frequency_hz", "least_amplitude", "most_amplitude")
         )

@@ -12,7 +12,7 @@ from stickslip.analyses.forced_response.records.columns import CaseNumbers, Peak
 from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
-from stickslip.study.varied import first_varied_number, other_values
+from stickslip.study.varied import families, first_varied_number, key_name
 from stickslip.study.verdict import LEVELS, said
 
 Regime = Literal["stuck", "stiffens", "works", "lets go"]
@@ -118,10 +118,10 @@ class WorkingRange:
     regimes
         One for each peak, none if the stuck end is unknown. ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak;
         ``works``: more; ``lets go``: beyond the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
-    key
-        Varied key.
+    word, unit
+        Name and unit of the varied key: ``force``, ``N``.
     others
-        Values of the other varied keys; empty for none.
+        Name of the curve: the other varied keys with their values; empty for none.
     per_force
         Whether sizes are divided by the force.
     left_out
@@ -130,7 +130,8 @@ class WorkingRange:
 
     peaks: tuple[CurvePeak, ...]
     regimes: tuple[Regime, ...]
-    key: str = ""
+    word: str = ""
+    unit: str = ""
     others: str = ""
     per_force: bool = True
     left_out: tuple[str, ...] = ()
@@ -240,9 +241,9 @@ def working_range(peaks: Sequence[CurvePeak], key: str = "") -> WorkingRange | N
         return None
     end = sticks_at(rising, key)
     if end is None:
-        return WorkingRange(tuple(rising), (), key)
+        return WorkingRange(tuple(rising), ())
     ordered = rising if end == "low" else rising[::-1]
-    return WorkingRange(tuple(ordered), regimes_of(ordered), key)
+    return WorkingRange(tuple(ordered), regimes_of(ordered))
 
 
 def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
@@ -253,16 +254,14 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
     force = [own.excitation_n for own in of_cases(CaseNumbers, data)]
     per_force = all(own > 0 for own in force)
     labels = [str(x) for x in data["case_label"].values]
-    families: dict[str, list[int]] = {}
-    for case, others in enumerate(other_values(data, key)):
-        families.setdefault(others, []).append(case)
+    word, unit = key_name(data, key)
     found = []
-    for others, cases in families.items():
+    for others, cases in families(data, key).items():
         known = {c: _peak(data, c, float(values[c]), force[c], per_force=per_force) for c in cases}
         own = working_range([p for p in known.values() if p is not None], key)
         if own is not None:
             out = tuple(labels[c] for c, p in known.items() if p is None)
-            found.append(replace(own, others=others, per_force=per_force, left_out=out))
+            found.append(replace(own, word=word, unit=unit, others=others, per_force=per_force, left_out=out))
     return tuple(found)
 
 
@@ -276,14 +275,14 @@ def _peak(data: xr.Dataset, case: int, value: float, force: float, *, per_force:
     state = curve.read(PeakPeriod).peak_state
     if not np.isfinite(amplitude) or np.any(state < 0):
         return None
-    contacts, loss = contacts_at_peak(state), _loss(curve)
+    contacts, loss = contacts_at_peak(state), loss_at_peak(curve)
     if loss > 0.0:  # some laws, such as dahl, dissipate before they slip
         contacts = replace(contacts, linear=False)
     size = amplitude / force if per_force else amplitude
     return CurvePeak(value, size, curve.peak_hz, contacts, amplitude, loss, case, force)
 
 
-def _loss(curve: Curve) -> float:
+def loss_at_peak(curve: Curve) -> float:
     """Return the energy dissipated by contacts at a peak, J: zero for rounding, NaN if unknown."""
     if not curve.elastic > 0.0:
         return float("nan")
@@ -307,11 +306,32 @@ def with_regimes(data: xr.Dataset) -> xr.Dataset:
 
 
 TITLE = "Where friction works"
+MOST_TOLD = 3  # curves with sentences; of more curves each has a line
 
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:
     """State the working range of each curve of a forced response; empty if none can be judged."""
-    return tuple(said(own.others, text) for own in working_ranges(data) for text in range_sentences(own))
+    found = working_ranges(data)
+    if len(found) > MOST_TOLD:
+        return tuple(said(own.others, range_line(own)) for own in found)
+    return tuple(said(own.others, text) for own in found for text in range_sentences(own))
+
+
+def range_line(own: WorkingRange) -> str:
+    """State the working range of a curve in one line: where it works, the smallest peak, and where contacts stick and let go."""
+    if not own.judged:
+        return f"cannot be told from these values of {own.word}"
+    works = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
+    told = [f"friction works {works}" if works else f"friction works at no {own.word}"]
+    told.append(f"the {_size(own)} is smallest at {_value(own, own.smallest)}")
+    if own.stuck is not None:
+        told.append(f"all contacts stick {'from' if own.falling else 'up to'} {_value(own, own.stuck)}")
+    if own.loose:
+        held = own.peaks[own.peaks.index(own.loose[0]) - 1]
+        told.append(f"they let go {'below' if own.falling else 'above'} {_value(own, held)}")
+    if own.left_out:
+        told.append(f"not judged: {'; '.join(own.left_out)}")
+    return ", ".join(told)
 
 
 def range_sentences(own: WorkingRange) -> tuple[str, ...]:
@@ -324,11 +344,15 @@ def range_sentences(own: WorkingRange) -> tuple[str, ...]:
 
 
 def _unknown(own: WorkingRange) -> str:
-    return f"Where friction works cannot be told from these values of {own.key}: all contacts stick at neither end, and their states do not show which end is nearer to full stick. Add values beyond both ends."
+    return f"Where friction works cannot be told from these values of {own.word}: all contacts stick at neither end, and their states do not show which end is nearer to full stick. Add values beyond both ends."
 
 
 def _of(own: WorkingRange, peak: CurvePeak) -> str:
-    return f"{own.key} = {peak.value:g}"
+    return f"{own.word} {_value(own, peak)}".strip()
+
+
+def _value(own: WorkingRange, peak: CurvePeak) -> str:
+    return f"{peak.value:g} {own.unit}".strip()
 
 
 def _size(own: WorkingRange) -> str:
@@ -353,10 +377,8 @@ def _middle(own: WorkingRange) -> str:
         return "" if stuck is None else _hardly(own, stuck)
     where = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
     if stuck is None:
-        return (
-            f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {best.value:g}."
-        )
-    return f"Friction works {where}: the {_size(own)} lies 3 dB or more below the stuck system there. It is smallest at {best.value:g}: {_percent(best.size / stuck.size)} of the stuck system's, at {best.hertz:.5g} Hz."
+        return f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {_value(own, best)}."
+    return f"Friction works {where}: the {_size(own)} lies 3 dB or more below the stuck system there. It is smallest at {_value(own, best)}: {_percent(best.size / stuck.size)} of the stuck system's, at {best.hertz:.5g} Hz."
 
 
 def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
@@ -364,7 +386,7 @@ def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
     first, last = peaks[0], peaks[-1]
     if first is last:
         return f"at {_of(own, first)}"
-    return f"from {_of(own, first)} to {last.value:g}"
+    return f"from {_of(own, first)} to {_value(own, last)}"
 
 
 def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
@@ -372,7 +394,7 @@ def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
     off = [p.size / stuck.size - 1 for p in own.peaks]
     if max(off) > 1 / HALF_POWER - 1:
         best, worst = own.smallest, max(own.peaks, key=lambda p: p.size)
-        return f"Friction never takes the {_size(own)} 3 dB below the stuck system. It is smallest at {best.value:g}, {_percent(best.size / stuck.size)} of the stuck system's, and largest at {worst.value:g}, {_percent(worst.size / stuck.size)}."
+        return f"Friction never takes the {_size(own)} 3 dB below the stuck system. It is smallest at {_value(own, best)}, {_percent(best.size / stuck.size)} of the stuck system's, and largest at {_value(own, worst)}, {_percent(worst.size / stuck.size)}."
     word = "Down" if own.falling else "Up"
     return f"{word} to {_of(own, own.peaks[-1])} the {_size(own)} stays within {_percent(max(map(abs, off)))} of the stuck system's: the contacts stiffen but hardly damp."
 
@@ -391,7 +413,9 @@ def _loose_end(own: WorkingRange) -> str:
 
 def _gone(own: WorkingRange, gone: Sequence[CurvePeak]) -> str:
     worst, best = gone[-1], own.smallest
-    risen = f"the {_size(own)} has risen again, to {worst.size / best.size:.3g} times the smallest at {worst.value:g}"
+    risen = (
+        f"the {_size(own)} has risen again, to {worst.size / best.size:.3g} times the smallest at {_value(own, worst)}"
+    )
     if own.stuck is not None:
         risen += f" ({_percent(worst.size / own.stuck.size)} of the stuck system's)"
     risen += f", at {worst.hertz:.5g} Hz"
