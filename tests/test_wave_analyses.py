@@ -10,8 +10,10 @@ import pytest
 import xarray as xr
 from cyclic_models import unlike_wedge
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
+from test_report import page_text
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
+from stickslip.analyses.page import report_html
 from stickslip.analyses.waves.records import Wheel
 from stickslip.analyses.waves.solve import Question, solve_wave
 from stickslip.assembly.model import Model
@@ -31,7 +33,7 @@ from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
 from stickslip.study.run import answer, run_study
 from stickslip.study.store.netcdf import one_case
-from stickslip.study.verdict import stored
+from stickslip.study.verdict import of_tree, stored
 from stickslip.units import RPM
 
 STEEL = """
@@ -437,6 +439,23 @@ def test_contacts_of_a_wheel_hold_its_neighbours(tmp_path: Path) -> None:
     assert loose[2] == pytest.approx(held[2], rel=1e-12)
 
 
+def test_analyses_that_hold_contacts_differently_say_so(tmp_path: Path) -> None:
+    """The state of the contacts stands in every heading; where two analyses differ, in one sentence of verdicts and page."""
+    asked = {"modes.nodal_diameters": "[2]", "modes.contacts": '"open"', "safe.modes": "2"}
+    path = write_shrouded_sector(tmp_path, asked)
+    outcome = run_study(read_study(path), only=["modes", "safe"])
+    stuck = "contacts stuck where pressed at rest"
+    assert outcome.summaries["modes"][0].title.endswith(", contacts open")
+    assert f"rpm, {stuck}: " in outcome.summaries["safe"][0].title
+    why = "[modes] has contacts open; [campbell] and [safe] have contacts stuck where pressed at rest: the same mode has another frequency there"
+    assert [v.why for v in of_tree(outcome.tree)].count(why) == 1
+    text = page_text(report_html(outcome.tree))
+    assert "Natural frequencies, contacts open" in text
+    assert (
+        "[modes] has contacts open; [safe] has contacts stuck where pressed at rest: the same mode has another" in text
+    )
+
+
 def _first(outcome: Outcome) -> Sequence[float]:
     found: list[float] = outcome.tree["modes"].frequency_hz.values[:, 0, 0].tolist()
     return found
@@ -464,7 +483,8 @@ def test_cases_that_differ_in_harmonic_loads_alone_are_computed_and_shown_once(t
     outcome = run_study(made, only=["modes"])
     assert len(list((made.folder / "jobs").glob("*.job"))) == 1
     assert outcome.tree["modes"].sizes["case"] == 2
-    assert [t.title for t in outcome.summaries["modes"]] == ["Natural frequencies in Hz at rest"]
+    (table,) = outcome.summaries["modes"]
+    assert table.title == "Natural frequencies in Hz at rest, contacts stuck where pressed at rest"
     made = made.replace({"vary.part.chain.masses_kg": [[1.0] * 4, [2.0, 1.0, 1.0, 1.0]]})
     titles = [t.title for t in run_study(made, only=["modes"]).summaries["modes"]]
     assert len(list((made.folder / "jobs").glob("*.job"))) == len(titles) == 2

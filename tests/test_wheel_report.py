@@ -109,6 +109,27 @@ def test_each_case_has_its_chapter_and_buttons_choose(tmp_path: Path) -> None:
     assert '<div data-case="1" hidden><p><b>span = 2</b></p><figure id="fig-diameters_1"' in html
 
 
+def test_near_resonance_is_the_answer_and_opens_the_mode_shapes() -> None:
+    modes, safe = modes_result(), safe_result(0.1)
+    html = report_html(tree_of(provenance(), modes=modes, campbell=campbell_result(), safe=safe))
+    near = np.flatnonzero(safe.pair_near.values[0])
+    best = near[np.argmin(np.abs(safe.pair_margin.values[0, near]))]
+    order, wave, mode = (int(safe[f"pair_{n}"].values[0, best]) for n in ("engine_order", "wave", "mode"))
+    head = page_text(html)[: page_text(html).index("Natural frequencies and mode shapes")]
+    assert f"EO {order} meets ND {wave}, mode {mode + 1} (" in head
+    assert "Figure 1. SAFE diagram" in head
+    assert "near resonances within 10 %" in head or "1 near resonance within 10 %" in head
+    assert f'"shown":[{wave},{mode}]' in html
+    # without a SAFE diagram the crossing that is nearest to the speed of the modes
+    html = report_html(tree_of(provenance(), modes=modes, campbell=campbell_result()))
+    met = campbell_result()
+    k = int(np.argmin(np.abs(met.crossing_speed_rpm.values[0] - 6000.0)))
+    diameter = met.nodal_diameter.values[0, met.crossing_wave.values[0, k]]
+    assert f'"shown":[{diameter},{int(met.crossing_mode.values[0, k])}]' in html
+    assert "Figure 1. Campbell diagram" in page_text(html)
+    assert '"shown":[0,0]' in report_html(tree_of(provenance(), modes=modes))
+
+
 def test_cases_that_are_alike_are_drawn_once() -> None:
     data = modes_result()
     two = xr.concat([data, data], "case")

@@ -12,6 +12,8 @@ from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
 from stickslip.analyses.pictures import model
+from stickslip.analyses.waves.page import waves
+from stickslip.analyses.waves.page.resonant import with_resonance
 from stickslip.errors import input_error
 from stickslip.report.cases import CASE, cases_of
 from stickslip.report.content import Table, Words, chooser
@@ -25,6 +27,7 @@ from stickslip.study.store.netcdf import alike, one_case
 from stickslip.study.verdict import conclusion, not_trusted, of_tree
 
 FORCED = "forced_response"  # whose tractions other analyses bound
+MODES = "modes"  # whose shapes open on a mode that another analysis finds resonant
 
 
 def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
@@ -34,7 +37,7 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
             continue
         section: Section = loaded(home.page)
         data = analysis(tree, name)
-        data = with_bands(data, tree) if name == FORCED else data
+        data = with_bands(data, tree) if name == FORCED else with_resonance(data, tree) if name == MODES else data
         if all(name in data for name in section.needs) and data.sizes.get("case"):
             yield section, data
 
@@ -70,6 +73,13 @@ def _answer(shown: Sequence[Viewed]) -> Plot | None:
         figures = (own for own in _contents(parts, first) if isinstance(own, Plot))
         return None if others else next(figures, None)
     return None
+
+
+def _answering_first(shown: Sequence[Viewed]) -> list[Viewed]:
+    """Return the sections with the one that answers in front: the first that yields to no other."""
+    names = {section.name for section, _, _ in shown}
+    first = [own for own in shown if not names & set(own[0].yields_to)][:1]
+    return [*first, *(own for own in shown if own not in first)]
 
 
 def _cards(section: Section, data: xr.Dataset, views: Sequence[Any]) -> list[Card]:
@@ -143,9 +153,10 @@ def report_html(tree: xr.DataTree) -> str:
     shown = [(section, data, _views(section, data)) for section, data in _shown(tree)]
     placing, nodes = Placing(), {section.name: views[0] for section, _, views in shown}
     root = Node(tree.to_dataset())
-    above = _answer(shown)
-    figure = placing([above] if above else [])
-    cards = [card for own in shown for card in _cards(*own)]
+    ranked = _answering_first(shown)
+    above = _answer(ranked)
+    figure = placing([*([above] if above else []), *_contents((waves.states,), nodes)])
+    cards = [card for own in ranked for card in _cards(*own)]
     each = (_chapter(own, block, placing, above) for own in shown for block in own[0].blocks)
     chapters = [chapter for chapter in each if chapter is not None]
     body = placing(_contents((nonlinear_mode.over_responses,), nodes))

@@ -218,7 +218,7 @@ def page_html(
     cards
         Numbers at the top: the answer, then those below its figure.
     answer
-        Figure of the answer; empty for none.
+        Figure of the answer, and words below it; empty for none.
     conclusion
         Verdicts above all else; None for a page without verdicts.
     """

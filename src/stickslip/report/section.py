@@ -70,6 +70,8 @@ class Section:
         Numbers for the top of the page, the answer first.
     answer
         Parts that draw the answer: the first figure among them stands at the top of the page. Empty: the first figure of the section.
+    yields_to
+        Analyses whose answer and figure stand at the top instead, where the result has one of them.
     """
 
     name: str
@@ -79,3 +81,4 @@ class Section:
     by_case: bool = False
     cards: Callable[[Any], Sequence[Card]] = _nothing
     answer: tuple[Part, ...] = ()
+    yields_to: tuple[str, ...] = ()

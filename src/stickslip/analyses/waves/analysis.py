@@ -12,7 +12,7 @@ from stickslip.analyses.columns import variables
 from stickslip.analyses.facts import NOTE, ModelFacts, facts_in
 from stickslip.analyses.waves.records import wave_name
 from stickslip.analyses.waves.solve import Question, each_wave
-from stickslip.analyses.waves.verdicts import summary
+from stickslip.analyses.waves.verdicts import contact_notes, summary
 from stickslip.assembly.model import Model
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, TextTable
 from stickslip.study.store.netcdf import stacked
@@ -74,7 +74,8 @@ def dataset(solved: Sequence[Solved], answer: Answer) -> xr.Dataset:
         )
         cases.append(variables(own))
         noted = from_json(one.notes.get(NOTE, {}).get("verdicts", "[]"))
-        doubts += [replace(v, case=one.case.label) for v in (*noted, *said)]
+        states = contact_notes(one.case.settings) if own.contacts not in (None, "none") else ()
+        doubts += [replace(v, case=one.case.label) for v in (*noted, *states, *said)]
     data = stacked(cases)
     sizes = {dim: size for v in data.values() for dim, size in v.sizes.items()}
     coordinates: dict[str, Any] = {"mode": np.arange(1, sizes.get("mode", 0) + 1), **LABELS}

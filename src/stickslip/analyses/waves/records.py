@@ -1,6 +1,6 @@
 """Records of the analyses by waves: a record for each wave, and the record of a case; wave numbers and their names."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -208,6 +208,38 @@ class Interference(ModelFacts):
 
 
 OfWaves = Modes | Campbell | Flutter | Interference
+
+_STATES = {
+    "static": "contacts stuck where pressed at rest",
+    "stuck": "all contacts stuck",
+    "open": "contacts open",
+}
+
+
+def contact_state(contacts: str | None) -> str:
+    """Return what contacts do in small vibrations, in words, from `ModelFacts.contacts`; empty for a model without contacts."""
+    return _STATES.get(contacts or "", "")
+
+
+def with_contacts(text: str, contacts: str | None) -> str:
+    """Return a heading or a part of a sentence followed by the state of the contacts."""
+    return ", ".join(filter(None, (text, contact_state(contacts))))
+
+
+def states_that_differ(states: Mapping[str, str]) -> str:
+    """Return a sentence about analyses of one model that hold its contacts differently; empty if all do the same.
+
+    Parameters
+    ----------
+    states
+        Name of the table of an analysis -> its `contacts`.
+    """
+    groups: dict[str, list[str]] = {}
+    for name, state in states.items():
+        if contact_state(state):
+            groups.setdefault(contact_state(state), []).append(f"[{name}]")
+    told = [f"{' and '.join(names)} {'has' if len(names) == 1 else 'have'} {state}" for state, names in groups.items()]
+    return f"{'; '.join(told)}: the same mode has another frequency there" if len(told) > 1 else ""
 
 
 def hertz(found: Modes | Flutter | Interference) -> FloatArray:

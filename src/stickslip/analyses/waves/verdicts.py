@@ -25,10 +25,13 @@ from stickslip.analyses.waves.records import (
     label,
     labels,
     stages,
+    states_that_differ,
+    with_contacts,
 )
 from stickslip.analyses.waves.tables import FlutterTable
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.statics import MOST_DISPLACEMENT, MOST_ROTATION, MOST_STRAIN, StaticState
+from stickslip.report.quantities import counted
 from stickslip.response.rotating.flutter import damping_ratio
 from stickslip.response.rotating.safe import Safe
 from stickslip.study.analysis import TextTable
@@ -44,6 +47,17 @@ MOST_ROWS = 40  # modes of a mistuned wheel on the screen
 LEAST = 5  # of them in a flow
 MOST_PAIRS = 30  # of an interference table on the screen
 NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
+
+
+WAVES = ("modes", "campbell", "flutter", "safe")  # tables of these analyses
+
+
+def contact_notes(settings: Any) -> tuple[Verdict, ...]:
+    """Note that analyses of one study hold the contacts of the model differently."""
+    asked = {name: getattr(settings, name, None) for name in WAVES}
+    why = states_that_differ({name: own.contacts for name, own in asked.items() if own is not None})
+    remedy = "Give them the same `contacts` to compare frequencies."
+    return (Verdict("trusted", why=why, remedy=remedy),) if why else ()
 
 
 def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[Verdict, ...]:
@@ -230,7 +244,7 @@ def modes_tables(found: Modes) -> list[TextTable]:
             (*name, *(format(f, form) for f in own)) for name, own in zip(names, values, strict=True) if own is not None
         )
 
-    title = f"Natural frequencies in Hz {_at(found)}"
+    title = with_contacts(f"Natural frequencies in Hz {_at(found)}", found.contacts)
     tables = [TextTable(title, head, of([w.frequencies_hz for w in found.waves], ".7g"))]
     if found.waves[0].shares is not None:
         title = "The same in Hz, all harmonics held that flanges do not couple"
@@ -273,7 +287,8 @@ def _damped_table(found: Modes, names: Sequence[tuple[str, str]], head: tuple[st
         for name, own in zip(names, found.waves, strict=True)
         if own.damped_hz is not None and own.damping is not None
     )
-    return TextTable("Damped frequencies in Hz and damping ratios in the flow", head, rows)
+    title = with_contacts("Damped frequencies in Hz and damping ratios in the flow", found.contacts)
+    return TextTable(title, head, rows)
 
 
 def _wheel_table(modes: Sequence[WheelMode]) -> list[TextTable]:
@@ -309,7 +324,7 @@ def flutter_tables(found: Flutter) -> list[TextTable]:
     )
     head = ("wave", "phase angle deg", "mode", "Hz", "by energy %", "by eigenvalue %", "with structure %", "")
     title = (
-        f"Flutter margins {_at(found)}: the least stable is {names[i]}, mode {m + 1}, with "
+        f"{with_contacts(f'Flutter margins {_at(found)}', found.contacts)}: the least stable is {names[i]}, mode {m + 1}, with "
         f"{100 * (total[i, m] - required):.4g} %"
     )
     tables = [TextTable(title, head, rows)]
@@ -344,9 +359,9 @@ def campbell_tables(found: Campbell) -> list[TextTable]:
         (f"{rpm:.1f}", f"{hz:.2f}", f"{order}", names[wave], f"{mode + 1}")
         for rpm, hz, order, wave, mode in sorted(crossings)
     )
-    title = "Crossings with engine orders that excite the mode"
+    title = with_contacts("Crossings with engine orders that excite the mode", found.contacts)
     return [
-        TextTable("Frequencies in Hz", head, rows),
+        TextTable(with_contacts("Frequencies in Hz", found.contacts), head, rows),
         TextTable(title, ("rpm", "Hz", "engine order", "wave", "mode"), met),
     ]
 
@@ -356,7 +371,8 @@ def safe_tables(found: Interference) -> list[TextTable]:
     names, pairs, near = labels(found), len(found.pairs), sum(pair.near for pair in found.pairs)
     shown = min(max(MOST_PAIRS, near), pairs)
     rows = tuple(_pair(pair, names) for pair in found.pairs[:shown])
-    title = f"At {found.speed_rpm:g} rpm: {near} near resonances within {found.margin_percent:g} %"
+    at = with_contacts(f"At {found.speed_rpm:g} rpm", found.contacts)
+    title = f"{at}: {counted(near, 'near resonance')} within {found.margin_percent:g} %"
     if shown < pairs:
         title += f"; the nearest {shown} of {pairs} pairs"
     head = ("engine order", "wave", "mode", f"Hz at {found.speed_rpm:g} rpm", "resonance at rpm", "margin %", "")

@@ -113,6 +113,7 @@ document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
     const done = Plotly.restyle(plot, change, [0]);
     return Object.keys(layout).length ? done.then(() => Plotly.relayout(plot, layout)) : done;
   };
+  [form.elements.wave.value, form.elements.mode.value] = data.shown;
   player(form, draw);
 });
 document.querySelectorAll('form.shapes[data-of="motion"]').forEach(form => {

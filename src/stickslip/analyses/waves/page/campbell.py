@@ -4,13 +4,14 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, view_of
-from stickslip.analyses.waves.records import Campbell
+from stickslip.analyses.waves.records import Campbell, contact_state, with_contacts
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
 
+_MOST_TOLD = 3  # crossings in the answer
 _DASHES = ("solid", "dot", "dashdot", "longdash")
 # a wave has its own, so that a print without colours can be read
 _SYMBOLS = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
@@ -138,7 +139,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     found = f"{counted(n, 'crossing')} marked" if n else "no crossing in the range"
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
-        f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, in the frame that turns with the wheel. "
+        f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, {with_contacts('in the frame that turns with the wheel', view.found.contacts)}. "
         f"Lines are labelled with wave and mode. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
@@ -146,7 +147,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
 
 def crossings(view: Waves[Campbell]) -> Table | Words:
     """Return the crossings of a Campbell diagram in the order of speed."""
-    title = "Crossings"
+    title = with_contacts("Crossings", view.found.contacts)
     if not view.found.crossings:
         told = "No engine order meets a mode that it excites within the speeds."
         return Words((told,), title)
@@ -160,10 +161,20 @@ def crossings(view: Waves[Campbell]) -> Table | Words:
 
 def _cards(view: Waves[Campbell]) -> list[Card]:
     rpm = view.found.speeds_rpm
-    note = f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm"
-    return [Card(str(len(view.found.crossings)), "crossings with engine orders", note)]
+    over = f"from {number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm"
+    met = sorted(view.found.crossings, key=lambda one: one[1].speed_rpm)
+    told = [
+        f"EO {c.engine_order} meets {view.waves[w]}, mode {c.mode + 1} at {number(c.speed_rpm, 4)} rpm"
+        for w, c in met[:_MOST_TOLD]
+    ]
+    told += [f"and {len(met) - _MOST_TOLD} more"] * (len(met) > _MOST_TOLD)
+    count, noun = counted(len(met), "crossing").split(" ")
+    note = "; ".join(filter(None, (", ".join(told), contact_state(view.found.contacts))))
+    return [Card(count if met else "No", f"{noun if met else 'crossing'} with engine orders {over}", note)]
 
 
 _NEEDS = (*NEEDED, "speed_rpm")
 _BLOCK = Block("campbell", "Frequencies against speed", (campbell_diagram, crossings))
-SECTION: Section = Section("campbell", _NEEDS, view_of(Campbell), (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section(
+    "campbell", _NEEDS, view_of(Campbell), (_BLOCK,), by_case=True, cards=_cards, yields_to=("safe",)
+)

@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.waves.page.waves import Waves, view_of
-from stickslip.analyses.waves.records import Flutter, hertz
+from stickslip.analyses.waves.records import Flutter, contact_state, hertz, with_contacts
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, MUTED, Plot, colour, ring, styled
@@ -61,6 +61,7 @@ def least_stable_diagram(view: Waves[Flutter]) -> Plot:
     figure.update_xaxes(title_text="inter-blade phase angle (degrees)", range=[-186, 186], dtick=45)
     figure.update_yaxes(title_text="damping ratio (%)", zeroline=True, zerolinecolor=MUTED)
     i, m = view.found.least_wave, view.found.least_mode
+    state = contact_state(view.found.contacts)
     below = int(np.count_nonzero(total < required))
     fate = (
         f"{counted(below, 'wave')} and modes lie below the dashed line of {number(required)} %."
@@ -69,7 +70,7 @@ def least_stable_diagram(view: Waves[Flutter]) -> Plot:
     )
     caption = (
         f"Aerodynamic damping over the inter-blade phase angle. The curve follows from the influence coefficients at any angle by "
-        f"the energy method; marks are the waves that the wheel has. Angles above zero are waves that run backward, against the "
+        f"the energy method{f', {state}' if state else ''}; marks are the waves that the wheel has. Angles above zero are waves that run backward, against the "
         f"rotation. The least stable is {names[i]}, mode {m + 1}, with {number(float(total[i, m]), 4)} % of critical "
         f"damping, that of the structure included. {fate}"
     )
@@ -113,7 +114,7 @@ def margins(view: Waves[Flutter]) -> Table:
         "with the structure (%)",
         "",
     ]
-    return Table(head, rows, "Margins")
+    return Table(head, rows, with_contacts("Margins", view.found.contacts))
 
 
 def mistuned(view: Waves[Flutter]) -> Words | None:
@@ -134,7 +135,7 @@ def _cards(view: Waves[Flutter]) -> list[Card]:
     total = view.found.damping
     i, m = view.found.least_wave, view.found.least_mode
     least, required = float(total[i, m]), view.found.required_damping
-    note = f"{view.waves[i]}, mode {m + 1}"
+    note = with_contacts(f"{view.waves[i]}, mode {m + 1}", view.found.contacts)
     if least < required:
         grow = int(np.count_nonzero(total < 0))
         fate = (

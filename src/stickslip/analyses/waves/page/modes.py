@@ -6,7 +6,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.waves.page.shapes import mode_shapes
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
-from stickslip.analyses.waves.records import Modes, hertz, stages
+from stickslip.analyses.waves.records import Modes, hertz, stages, with_contacts
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, Plot, colour, legend_above, ring, styled
@@ -97,7 +97,7 @@ def diameter_map(view: Waves[Modes]) -> Plot:
     hz = hertz(view.found)
     caption = (
         f"{counted(hz.shape[1], 'mode')} of {counted(len(hz), 'wave')}, {number(hz.min(), 5)} to {number(hz.max(), 5)} Hz, "
-        f"{view.found.rotation or ''}. Lines join the same mode number; modes of different families that come close repel each "
+        f"{with_contacts(view.found.rotation or '', view.found.contacts).removeprefix(', ')}. Lines join the same mode number; modes of different families that come close repel each "
         f"other instead of crossing (veering).{reference}"
     )
     return Plot(f"diameters{view.key}", "Nodal-diameter map", caption, figure)
@@ -111,7 +111,7 @@ def frequencies(view: Waves[Modes]) -> list[Table]:
     kinds = [w.kind if view.both or w.kind == "standing" else "both ways" for w in view.found.waves]
     names = [f"{name}, {kind}" if view.sectors > 1 else name for name, kind in zip(view.waves, kinds, strict=True)]
     rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]
-    found = [Table(head, rows, "Natural frequencies")]
+    found = [Table(head, rows, with_contacts("Natural frequencies", view.found.contacts))]
     held = [w.stiffest_hz for w in view.found.waves if w.stiffest_hz is not None]
     if not held:
         return found
@@ -135,7 +135,7 @@ def in_flow(view: Waves[Modes]) -> Table | None:
         return None
     head = ["wave", *(f"mode {m}" for m in range(1, len(rows[0])))]
     text = "Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio."
-    return Table(head, rows, "In the flow", (text,))
+    return Table(head, rows, with_contacts("In the flow", view.found.contacts), (text,))
 
 
 def stage_shares(view: Waves[Modes]) -> Plot | None:
@@ -169,7 +169,7 @@ def stage_shares(view: Waves[Modes]) -> Plot | None:
 
 def comparison(view: Waves[Modes]) -> Table | Words | None:
     """Return a table of relative differences from the reference, one row a wave."""
-    title, off = "Against the reference", _differences(view)
+    title, off = with_contacts("Against the reference", view.found.contacts), _differences(view)
     if not off.size:
         return None
     known = int(np.isfinite(off).sum())
@@ -205,9 +205,10 @@ def _cards(view: Waves[Modes]) -> list[Card]:
     hz, off = hertz(view.found), np.abs(_differences(view))
     over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
     lowest = f"{number(float(np.nanmin(hz)), 5)} Hz"
-    found = [Card(lowest, "lowest natural frequency", f"{hz.size} modes, {over}")]
+    note = with_contacts(f"{hz.size} modes, {over}", view.found.contacts)
+    found = [Card(lowest, "lowest natural frequency", note)]
     if np.isfinite(off).any():
-        note = f"of {np.count_nonzero(np.isfinite(off))} frequencies"
+        note = with_contacts(f"of {np.count_nonzero(np.isfinite(off))} frequencies", view.found.contacts)
         worst = percent(100 * float(np.nanmax(off)))
         found.append(Card(worst, "largest difference from the reference", note))
     return found
@@ -217,4 +218,6 @@ _TITLE = "Natural frequencies and mode shapes"
 _BLOCK = Block(
     "modes", _TITLE, (diameter_map, stage_shares, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
 )
-SECTION: Section = Section("modes", NEEDED, view_of(Modes), (_BLOCK,), by_case=True, cards=_cards)
+SECTION: Section = Section(
+    "modes", NEEDED, view_of(Modes), (_BLOCK,), by_case=True, cards=_cards, yields_to=("campbell", "flutter", "safe")
+)

@@ -6,13 +6,14 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
-from stickslip.analyses.waves.records import Interference, Pair, hertz
+from stickslip.analyses.waves.records import Interference, Pair, contact_state, hertz, with_contacts
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 
+_MOST_TOLD = 3  # near resonances in the answer
 _MOST_LABELS = 40  # engine orders written beside the zig-zag line
 
 
@@ -73,7 +74,7 @@ def safe_diagram(view: Waves[Interference]) -> Plot:
         else f"no mode is within {margin} % of an engine order that excites it"
     )
     caption = (
-        f"At {number(view.rpm, 5)} rpm engine order m excites at m times the speed, and only the nodal diameter "
+        f"At {with_contacts(f'{number(view.rpm, 5)} rpm', found.contacts)}{', ' if contact_state(found.contacts) else ' '}engine order m excites at m times the speed, and only the nodal diameter "
         f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}. Margins refer to the speed at which order and mode meet, with the frequency's change over the speed."
     )
     if unjudged:
@@ -150,7 +151,8 @@ def interference(view: Waves[Interference]) -> Table:
         "margin in speed",
         "",
     ]
-    return Table(head, rows, "Engine orders and the modes that they can excite")
+    title = with_contacts("Engine orders and the modes that they can excite", view.found.contacts)
+    return Table(head, rows, title)
 
 
 def _rpm(value: float, margin: float) -> str:
@@ -162,9 +164,34 @@ def _rpm(value: float, margin: float) -> str:
 
 def _cards(view: Waves[Interference]) -> list[Card]:
     found = view.found
-    near, rpm = sum(pair.near for pair in found.pairs), number(view.rpm, 5)
-    note = f"margin {number(found.margin_percent)} %"
-    return [Card(str(near), f"near resonances at {rpm} rpm", note)]
+    state = contact_state(found.contacts)
+    within = f"within {number(found.margin_percent)} % of {number(view.rpm, 5)} rpm"
+    near = sorted((pair for pair in found.pairs if pair.near), key=lambda pair: abs(pair.margin))
+    if not near:
+        return [Card("No", f"near resonance {within}", ", ".join(filter(None, (_nearest(view), state))))]
+    first, *others = (_met(view, pair) for pair in near)
+    more = [f"{counted(len(near), 'near resonance')} {within}", *others[: _MOST_TOLD - 1]]
+    more += [f"and {len(near) - _MOST_TOLD} more"] * (len(near) > _MOST_TOLD)
+    rpm = f"{number(view.rpm * (1 + near[0].margin), 5)} rpm"
+    return [Card(rpm, f"{first}", "; ".join(filter(None, (", ".join(more), state))))]
+
+
+def _met(view: Waves[Interference], pair: Pair) -> str:
+    """Return which order meets which mode, and how far from the speed."""
+    return f"EO {pair.engine_order} meets {view.waves[pair.wave]}, mode {pair.mode + 1} ({_signed(pair.margin)})"
+
+
+def _signed(margin: float) -> str:
+    return f"{'+' if margin > 0 else ''}{percent(100 * margin, 2)}"
+
+
+def _nearest(view: Waves[Interference]) -> str:
+    """Return the pair with the least margin; empty for none that meets."""
+    found = [pair for pair in view.found.pairs if np.isfinite(pair.margin)]
+    least = min(found, key=lambda pair: abs(pair.margin), default=None)
+    if least is None:
+        return ""
+    return f"the nearest: {_met(view, least)} at {_rpm(view.rpm * (1 + least.margin), least.margin)} rpm"
 
 
 _NEEDS = (*NEEDED, "pair_margin")

@@ -13,8 +13,9 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from stickslip.analyses.pictures.skin import edges, segments, surface
+from stickslip.analyses.waves.page.resonant import MODE, WAVE
 from stickslip.analyses.waves.page.waves import Waves
-from stickslip.analyses.waves.records import Modes, hertz
+from stickslip.analyses.waves.records import Modes, contact_state, hertz
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.model.mesh.coarse import coarse_skin
 from stickslip.report.plot import FONT, MUTED, Plot, styled
@@ -44,9 +45,10 @@ def mode_shapes(view: Waves[Modes]) -> Plot | None:
     shape = np.array(shapes)[:, :modes, kept]
     data = _payload(view, points[kept], shape, faces)
     fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"
+    state = contact_state(found.contacts)
     left_out = "" if modes == there else f"The first {modes} of {there} modes are in the page."
     caption = (
-        f"Displacement over its largest value, on {counted(len(kept), 'point')} of the skin of a sector{fine}. Choose nodal "
+        f"{state.capitalize() + '. ' if state else ''}Displacement over its largest value, on {counted(len(kept), 'point')} of the skin of a sector{fine}. Choose nodal "
         f"diameter and mode, drag to turn, scroll to zoom; the camera button saves a PNG. Sector n moves as sector 0 turned by "
         f"n pitches, n phase angles ahead: play shows which way the wave travels. {left_out}"
     )
@@ -87,7 +89,9 @@ def _payload(view: Waves[Modes], points: FloatArray, shape: FloatArray, faces: I
     inside = _outside_of_wheel(view, faces)
     wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
     origin = np.zeros(3) if found.axis_origin is None else found.axis_origin * _MM
+    wave, mode = int(view.scalar(WAVE, 0)), int(view.scalar(MODE, 0))
     return {
+        "shown": [wave, mode] if mode < modes else [0, 0],
         "sectors": view.sectors,
         "axis": _unit(np.zeros(0) if found.axis_direction is None else found.axis_direction).tolist(),
         "origin": origin.tolist(),

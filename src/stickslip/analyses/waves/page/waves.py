@@ -1,6 +1,6 @@
 """One case of an analysis by waves on the page: frequencies by travelling wave and nodal diameter."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Generic, TypeVar
@@ -10,7 +10,8 @@ import plotly.graph_objects as go
 import xarray as xr
 
 from stickslip.analyses.columns import record_of
-from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes, hertz
+from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes, hertz, states_that_differ
+from stickslip.report.content import Words
 from stickslip.report.plot import colour
 from stickslip.report.result import Node
 
@@ -56,6 +57,19 @@ class Waves(Node, Generic[T]):
     def colours(self) -> tuple[str, ...]:
         """A CSS colour for each wave."""
         return tuple(colour(k) for k in range(len(self.waves)))
+
+
+def states(nodes: Mapping[str, Node]) -> Words | None:
+    """Return the sentence that analyses hold the contacts differently; None where all do the same.
+
+    Parameters
+    ----------
+    nodes
+        Views of the analyses of a result, by name.
+    """
+    waves = {name: own.found.contacts or "" for name, own in nodes.items() if isinstance(own, Waves)}
+    told = states_that_differ(waves)
+    return Words((f"{told}.",)) if told else None
 
 
 def view_of(kind: type[T]) -> Callable[[xr.Dataset], Waves[T]]:
