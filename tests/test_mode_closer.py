@@ -8,6 +8,7 @@ import scipy.linalg
 from scipy.optimize import brentq, minimize_scalar
 from test_nonlinear_modes import followed, one_mass
 
+import stickslip as ss
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.jenkins import Jenkins
@@ -67,7 +68,7 @@ def test_an_internal_resonance_is_found_where_a_harmonic_passes_another_mode(cou
     system, load = two_masses(coupling)
     sweep = ModeSweep(span=(0.05, 3.0), points=points)
     found = followed(system, load, Discretisation(order=5, samples=128), sweep)
-    told = re.search(r"internal resonance of harmonic 3 from ([\d.]+) to ([\d.]+) mm", found.end)
+    told = re.search(r"internal resonance of harmonic 3 with mode 2 from ([\d.]+) to ([\d.]+) mm", found.end)
     assert told is not None
     low, high = (1e-3 * float(v) for v in told.groups())
     assert 0.0 < np.log(high / low) < 1.1 * LOCATED
@@ -78,6 +79,36 @@ def test_an_internal_resonance_is_found_where_a_harmonic_passes_another_mode(cou
     phases = [np.angle(p.coefficients[3, 1] / p.coefficients[1, 0] ** 3) for p in near]
     assert max(shares) > 0.03
     assert abs(np.cos(phases[0]) - np.cos(phases[-1])) == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_damped_internal_resonance_is_none_of_the_damping_of_the_mode_alone() -> None:
+    K = 4e4 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    K[-1, -1] = 4e4
+    chain = ss.model.lumped(np.eye(4), K, 1.5e-4 * K, names=("m1", "m2", "m3", "m4"))
+    brake = ss.Contact(between=("chain.m2", "ground"), law=ss.Jenkins(k_t=2e4, limit=2.0), acts="tangential")
+    outputs = (ss.Output(name="last", on="chain.m4"),)
+    model = ss.Model(parts={"chain": ss.Part(structure=chain)}, contacts={"brake": brake}, outputs=outputs)
+    result = model.nonlinear_mode(modes=[1], amplitude_mm=(0.3, 2.0), points=10, harmonics=5, most_harmonics=5)
+    data = result["nonlinear_mode"].isel(case=0, branch=0)
+    assert "internal resonance of harmonic 5 with mode 4 from" in data.end.item()
+    on, ratio, hertz = data.resonant_harmonic.values > 0, data.damping_ratio.values, data.frequency_hz.values
+    assert set(data.resonant_harmonic.values[on]) == {5}
+    # the fourth mode's frequencies with the brake open and stuck
+    open_hz, stuck_hz = (
+        np.sqrt(np.linalg.eigvalsh(K + np.diag([0.0, k, 0.0, 0.0]))[3]) / (2 * np.pi) for k in (0.0, 2e4)
+    )
+    top = int(np.nanargmax(ratio))
+    assert on[top]
+    assert open_hz < 5.0 * hertz[top] < stuck_hz
+    # one mode by the describing function gives 7.5 %
+    assert data.largest_damping_ratio.item() == pytest.approx(np.nanmax(ratio[~on]))
+    assert data.largest_damping_ratio.item() < 0.08
+    assert ratio[top] > 0.12
+    doubt = next(v for v in result.verdicts if v.level == "doubtful" and "takes part" in v.why)
+    assert "elsewhere mode 1 has at most" in doubt.why
+    assert "decaying" in doubt.remedy
+    # both concepts are close where no other mode takes part
+    assert data.other_damping_ratio.item() == pytest.approx(data.largest_damping_ratio.item(), rel=0.1)
 
 
 def test_a_mode_that_takes_no_part_is_none() -> None:

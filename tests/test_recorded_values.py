@@ -227,7 +227,17 @@ def mode_records() -> Iterator[ModeRecord]:
                 order=1 + i,
                 status=Status.CONVERGED,
             )
-        yield ModeRecord(5 * k, k + 1, END, mode_omega=60.0 + k, mode_ratio=0.01 + k, tolerance=0.5, end="gross slip")
+        yield ModeRecord(
+            5 * k,
+            k + 1,
+            END,
+            mode_omega=60.0 + k,
+            mode_ratio=0.01 + k,
+            tolerance=0.5,
+            end="gross slip",
+            resonant=((), (0, 7, 0))[k],
+            other_ratio=0.3 + k,
+        )
 
 
 def test_nonlinear_modes() -> None:
@@ -256,8 +266,11 @@ def test_nonlinear_modes() -> None:
         end=["gross slip"] * 2,
         problem=["", ""],
         gross_slip_amplitude=[NAN, 1.001],
-        largest_damping_ratio=[0.2, 1.2],
-        largest_damping_amplitude=[2e-3, 1.002],
+        # the largest of the second mode, 1.2, is on an internal resonance
+        largest_damping_ratio=[0.2, 1.1],
+        largest_damping_amplitude=[2e-3, 1.001],
+        other_damping_ratio=[0.3, 1.3],
+        resonant_harmonic=[[0, 0, -1], [0, 7, 0]],
         amplitude=both(lambda i, k: 1e-3 * (i + 1) + k),
         frequency_hz=both(lambda i, k: (50.0 + i + k) / HZ),
         damping_ratio=both(lambda i, k: 0.1 * (2 - abs(i - 1)) + k),

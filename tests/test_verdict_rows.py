@@ -294,13 +294,35 @@ MODE_ROWS: list[Row] = [
     ({"end": ["lift-off at 1 mm"]}, [("note", "mode 3: lift-off at 1 mm", "Beyond it"), FOLLOWED]),
     ({"end": ["the step is too small"]}, [("doubtful", "the step is too small", "more points")]),
     (
-        {"end": ["amplitude reached; internal resonance of harmonic 3 from 1 to 2 mm"]},
-        [("warning", "mode 3: internal resonance of harmonic 3 from 1 to 2 mm", "Several motions"), FOLLOWED],
+        {"end": ["amplitude reached; internal resonance of harmonic 3 with mode 2 from 1 to 2 mm"]},
+        [
+            ("warning", "mode 3: internal resonance of harmonic 3 with mode 2 from 1 to 2 mm", "Several motions"),
+            FOLLOWED,
+        ],
     ),
     (
-        {"end": ["amplitude reached; stepped over an internal resonance of harmonic 3 from 1 to 2 mm"]},
+        {"end": ["amplitude reached; stepped over an internal resonance of harmonic 3 with mode 2 from 1 to 2 mm"]},
         [("doubtful", "stepped over an internal resonance", "amplitude_mm")],
     ),
+    (
+        {
+            "end": ["amplitude reached; internal resonance of harmonic 3 with mode 2 from 0.9 to 1 mm"],
+            "damping_ratio": [[0.01, 0.02, 0.09]],
+            "resonant_harmonic": [[0, 0, 3]],
+        },
+        [("doubtful", "gives up to 9 % damping at 1 mm; elsewhere mode 3 has at most 2 % at 0.1 mm", "decaying")],
+    ),
+    (
+        {
+            "end": ["amplitude reached; internal resonance of harmonic 3 with mode 2 from 0.9 to 1 mm"],
+            "damping_ratio": [[0.01, 0.02, 0.01]],
+            "resonant_harmonic": [[0, 0, 3]],
+        },
+        [("warning", "internal resonance of harmonic 3 with mode 2", "Several motions"), FOLLOWED],
+    ),
+    ({"other_damping_ratio": [0.015]}, [("trusted", "2 % at 0.1 mm; decaying motions give 1.5 % there")]),
+    ({"other_damping_ratio": [0.020001]}, [("trusted", "2 % at 0.1 mm.")]),
+    ({"other_damping_ratio": [NAN]}, [("trusted", "2 % at 0.1 mm; no decaying motions are near")]),
     ({"end": ["amplitude reached, taken up again"]}, [("doubtful", "0 of its points are no motions", "another mode")]),
     ({"problem": ["mode 3: no such mode."]}, [("doubtful", "mode 3: no such mode.")]),
     ({"status": [[0, 1, 0]], "change": [[0.0, NAN, 0.0]]}, [("doubtful", "1 of its points are no motions")]),

@@ -193,8 +193,10 @@ def _cards(view: Modes) -> list[Card]:
     if not known:
         return []
     most = max(known, key=lambda branch: branch.largest_damping_ratio)
-    at = quantity(most.largest_damping_amplitude, "m")
-    return [Card(f"{number(100 * most.largest_damping_ratio)} %", "most damping of a mode", f"{most.name} at {at}")]
+    said = f"{most.name} at {quantity(most.largest_damping_amplitude, 'm')}"
+    if (on := most.most_on_resonance) is not None:
+        said += f"; up to {number(100 * float(most.damping_ratio[on]))} % on an internal resonance"
+    return [Card(f"{number(100 * most.largest_damping_ratio)} %", "most damping of a mode", said)]
 
 
 _BLOCK = Block("nonlinear-modes", "Nonlinear modes", (frequencies, damping, energies, table))

@@ -12,7 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.column import column, rows
 from stickslip.reduction.waves import NO_WAVE, wave
 from stickslip.response.continuation.branch import Followed, Judged, Kind, branch_of
-from stickslip.response.nonlinear_modes.backbone import ModeWay, mode_point
+from stickslip.response.nonlinear_modes.backbone import ModeWay, mode_point, most_damped
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution
@@ -49,7 +49,7 @@ class ModeRecord:
         (order + 1, n, 2) displacement of all coordinates, real and imaginary, m; empty if it is no point of the mode.
     order
         Highest harmonic.
-    mode_omega, mode_ratio, tolerance, end, problem
+    mode_omega, mode_ratio, tolerance, end, problem, resonant, other_ratio
         Properties of the end, as in `ModeBranch`.
     """
 
@@ -84,6 +84,8 @@ class ModeRecord:
     tolerance: float = np.nan
     end: str = ""
     problem: str = ""
+    resonant: tuple[int, ...] = ()
+    other_ratio: float = np.nan
 
     @property
     def followed(self) -> Followed:
@@ -159,8 +161,11 @@ class ModeBranch:
     gross_slip_amplitude: float = column(
         "m", "amplitude from which on all contacts, and all their sliders, slip or open at some time"
     )
-    largest_damping_ratio: float = column("1", "largest damping ratio")
+    largest_damping_ratio: float = column("1", "largest damping ratio without internal resonances")
     largest_damping_amplitude: float = column("m", "amplitude there")
+    other_damping_ratio: float | None = column(
+        "1", "damping ratio there by the other concept; NaN without a motion near", default=None
+    )
     amplitude: FloatArray = column("m", "amplitude of the output in the first harmonic", along="point")
     frequency_hz: FloatArray = column("Hz", "frequency of the motion", along="point")
     damping_ratio: FloatArray = column("1", "damping ratio of the motion; negative: it grows", along="point")
@@ -181,6 +186,12 @@ class ModeBranch:
         "relative change of frequency or damping ratio predicted for more harmonics; with the most harmonics, the change from fewer; NaN with one set alone",
         along="point",
     )
+    resonant_harmonic: IntArray | None = column(
+        "1",
+        "harmonic by which another mode takes part (internal resonance); 0 without any",
+        along="point",
+        default=None,
+    )
     motions: FloatArray = field(default_factory=lambda: np.zeros((0, 1, 0, 2)))
 
     @property
@@ -192,6 +203,21 @@ class ModeBranch:
     def known(self) -> BoolArray:
         """Mask of the valid points; results pad shorter modes."""
         return np.asarray(self.status >= 0)
+
+    @property
+    def resonant(self) -> BoolArray:
+        """Mask of the points on an internal resonance."""
+        own = self.resonant_harmonic
+        return np.zeros(self.status.shape, dtype=bool) if own is None else np.asarray(own > 0)
+
+    @property
+    def most_on_resonance(self) -> int | None:
+        """Index of the largest damping ratio if it lies on an internal resonance; otherwise None."""
+        ratio = self.damping_ratio
+        if not np.any(self.resonant) or not np.any(np.isfinite(ratio)):
+            return None
+        most = int(np.nanargmax(ratio))
+        return most if self.resonant[most] and ratio[most] > self.largest_damping_ratio else None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -233,7 +259,7 @@ def branches_of(records: Sequence[ModeRecord], sectors: int) -> tuple[ModeBranch
 def _branch(way: Sequence[ModeRecord], last: ModeRecord, sectors: int) -> ModeBranch:
     points = [] if last.problem else branch_of(way)
     amplitude, ratio, slipping = (_along(points, name) for name in ("amplitude", "ratio", "slipping"))
-    most = int(np.nanargmax(ratio)) if np.any(np.isfinite(ratio)) else -1
+    most = most_damped(ratio, last.resonant)
     gross = amplitude[slipping == 1.0]
     return ModeBranch(
         wave_number=last.wave_number,
@@ -245,8 +271,9 @@ def _branch(way: Sequence[ModeRecord], last: ModeRecord, sectors: int) -> ModeBr
         end=last.end,
         problem=last.problem,
         gross_slip_amplitude=float(gross[0]) if gross.size else np.nan,
-        largest_damping_ratio=float(ratio[most]) if most >= 0 else np.nan,
-        largest_damping_amplitude=float(amplitude[most]) if most >= 0 else np.nan,
+        largest_damping_ratio=np.nan if most is None else float(ratio[most]),
+        largest_damping_amplitude=np.nan if most is None else float(amplitude[most]),
+        other_damping_ratio=last.other_ratio,
         amplitude=amplitude,
         frequency_hz=_along(points, "omega") / HZ,
         damping_ratio=ratio,
@@ -257,6 +284,9 @@ def _branch(way: Sequence[ModeRecord], last: ModeRecord, sectors: int) -> ModeBr
         slipping=slipping,
         open_for=_along(points, "open_for"),
         change=_along(points, "change"),
+        resonant_harmonic=np.array(
+            last.resonant if len(last.resonant) == len(points) else [0] * len(points), dtype=np.int64
+        ),
         motions=_motions(points),
     )
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from stickslip.analyses.nonlinear_mode.problem import Question
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, mode_record
 from stickslip.analyses.vibrating import as_wave, known_coordinates
@@ -34,7 +36,7 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
 
 def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]) -> Iterator[ModeRecord]:
     """Yield the missing points of one mode, and its end."""
-    end, problem = "", ""
+    end, problem, resonant, other = "", "", (), np.nan
     every = [r.followed for r in done]
     try:
         way = mode_way(
@@ -48,7 +50,8 @@ def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[M
         for found in way.follow(tuple(every)):
             every.append(found)
             yield mode_record(wave, mode, way, found)
-        end = way.backbone(every).end
+        mode_found = way.backbone(every)
+        end, resonant, other = mode_found.end, mode_found.resonant, mode_found.other_ratio
     except StickslipError as error:
         problem = str(error)
     yield ModeRecord(
@@ -60,6 +63,8 @@ def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[M
         tolerance=question.sweep.tolerance,
         end=end,
         problem=problem,
+        resonant=resonant,
+        other_ratio=other,
     )
 
 

@@ -19,7 +19,7 @@ LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
 
 def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
     """Return the verdicts on a case."""
-    each = [_of_branch(label, branch) for branch in found.branches]
+    each = [_of_branch(label, found, branch) for branch in found.branches]
     sound = [b for b, own in zip(found.branches, each, strict=True) if all(v.level == "trusted" for v in own)]
     verdicts = [v for own in each for v in own]
     return [*verdicts, Verdict("trusted", label, None, _followed(found, sound))] if sound else verdicts
@@ -36,10 +36,19 @@ def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
     where = f" at {millimetres(at)}" if abs(ratio) > NONE else ""
     of = f", of {most.name}" if every > 1 and where else ""
     sizes = millimetres_between(float(np.nanmin(amplitude)), float(np.nanmax(amplitude)))
-    return f"{who} followed from {sizes}: {damping}{where}{of}"
+    return f"{who} followed from {sizes}: {damping}{where}{of}{_by_the_other_concept(found, most)}"
 
 
-def _of_branch(label: str, branch: ModeBranch) -> list[Verdict]:
+def _by_the_other_concept(found: NonlinearModes, branch: ModeBranch) -> str:
+    """Say what the other concept gives at the largest damping, where it differs by more than the accuracy; empty otherwise."""
+    ratio, other = branch.largest_damping_ratio, branch.other_damping_ratio
+    if other is None or abs(ratio) <= NONE or abs(other - ratio) <= branch.accuracy * abs(ratio):
+        return ""
+    motions = "periodic motions" if found.concept == "decaying" else "decaying motions"
+    return f"; {motions} give {100 * other:.3g} % there" if np.isfinite(other) else f"; no {motions} are near"
+
+
+def _of_branch(label: str, whole: NonlinearModes, branch: ModeBranch) -> list[Verdict]:
     name, problem, end = branch.name, branch.problem, branch.end
     if problem:
         return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.').removeprefix(f'{name}: ')}")]
@@ -57,7 +66,7 @@ def _of_branch(label: str, branch: ModeBranch) -> list[Verdict]:
         )
     elif not end.startswith(("amplitude reached", "gross slip")):
         found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))
-    found += _of_resonances(label, name, end)
+    found += _of_resonances(label, whole, branch)
     status = branch.status
     gaps = int(np.count_nonzero(status > 0))
     solved = np.flatnonzero(status == 0)
@@ -68,15 +77,26 @@ def _of_branch(label: str, branch: ModeBranch) -> list[Verdict]:
     return found + _of_harmonics(label, branch)
 
 
-def _of_resonances(label: str, name: str, end: str) -> list[Verdict]:
+def _of_resonances(label: str, whole: NonlinearModes, branch: ModeBranch) -> list[Verdict]:
     """Return what is to be thought of harmonics that meet other modes."""
-    told = [text for text in end.split("; ") if MEETS in text]
+    name = branch.name
+    told = [text for text in branch.end.split("; ") if MEETS in text]
     over = [text for text in told if text.startswith(OVER)]
     if over:
         remedy = "Give nonlinear_mode.amplitude_mm around it, with more points: other motions of the same amplitude exist there."
         return [Verdict("doubtful", label, None, f"{name}: {'; '.join(over)}", remedy)]
     if not told:
         return []
+    if (most := branch.most_on_resonance) is not None:
+        sizes = branch.amplitude[branch.resonant]
+        reach = millimetres_between(float(np.nanmin(sizes)), float(np.nanmax(sizes)))
+        top = f"up to {100 * branch.damping_ratio[most]:.3g} % damping at {millimetres(branch.amplitude[most])}"
+        own = f"{100 * branch.largest_damping_ratio:.3g} % at {millimetres(branch.largest_damping_amplitude)}"
+        why = f"{name}: {'; '.join(told)}, which takes part from {reach} and gives {top}; elsewhere {name} has at most {own}"
+        why += _by_the_other_concept(whole, branch)
+        other = "periodic" if whole.concept == "decaying" else "decaying"
+        remedy = f'Compare nonlinear_mode.concept = "{other}", and the peak of a forced response of that amplitude.'
+        return [Verdict("doubtful", label, None, why, remedy)]
     remedy = "Several motions of one amplitude may exist there, and a forced response near it has more than one peak."
     return [Verdict("trusted", label, None, f"{name}: {'; '.join(told)}", remedy, warns=True)]
 

@@ -5,26 +5,27 @@ amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Literal
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.continuation.adaptive_continuation import LEAPS, follow
 from stickslip.response.continuation.branch import Followed, Route, branch_of
-from stickslip.response.nonlinear_modes.closer import LOCATED, TAKES_PART, Closer
+from stickslip.response.nonlinear_modes.closer import LOCATED, Closer
 from stickslip.response.nonlinear_modes.harmonic_levels import ModeCurve
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import slip_amplitude
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import Contacts, contacts_of, leaving, self_excited_motions
 from stickslip.response.system import System
+from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 from stickslip.units import millimetres, millimetres_between
 
@@ -106,6 +107,10 @@ class Backbone:
         Points in the order of the curve; the amplitude turns back at a fold.
     end
         Reason for the end of the curve, in words.
+    resonant
+        Harmonic of each point by which another mode takes part in the motion (internal resonance); 0 without any.
+    other_ratio
+        Damping ratio by the other concept at the amplitude of `largest`; NaN where it has no motion near.
     """
 
     system: System
@@ -114,6 +119,13 @@ class Backbone:
     dof: int
     points: tuple[ModePoint, ...]
     end: str
+    resonant: tuple[int, ...] = ()
+    other_ratio: float = np.nan
+
+    @property
+    def largest(self) -> int | None:
+        """Index of the point of the largest damping ratio of this mode alone, without internal resonances; None without a solution."""
+        return most_damped([p.ratio if p.converged else np.nan for p in self.points], self.resonant)
 
     @property
     def solutions(self) -> tuple[ModePoint, ...]:
@@ -209,19 +221,30 @@ class ModeWay:
         end = _end(made, found[-1], self.route.last, stops=self.to_gross_slip)
         anew = _begun_anew(found, self.route, self.curve.control.first)
         end += f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
-        end += self._resonances(found, made)
-        return Backbone(own.system, own.load, own.mode, own.dof, made, end)
+        closer = Closer(self.curve, list(found))
+        end += self._resonances(closer, made)
+        mode = Backbone(own.system, own.load, own.mode, own.dof, made, end, tuple(closer.resonant()))
+        most = mode.largest
+        return mode if most is None else replace(mode, other_ratio=self._by_the_other_concept(found[most]))
 
-    def _resonances(self, found: Sequence[Followed], made: Sequence[ModePoint]) -> str:
+    def _by_the_other_concept(self, one: Followed) -> float:
+        """Return the damping ratio by the other concept at the amplitude of a point; NaN where it has no motion near."""
+        other = replace(self.curve, decaying=not self.curve.decaying, wider={})
+        problem, own = other.problem(one.level), other.problems[one.level]
+        found = newton(lambda y: problem.linearise(y, one.p), one.point.x, own.how.newton)
+        return other.frequency_and_damping(one.level, found.x)[1] if found.status.converged else np.nan
+
+    def _resonances(self, closer: Closer, made: Sequence[ModePoint]) -> str:
         """Return where harmonics of the mode meet other modes that respond or may respond; empty without any."""
         said = []
-        for one in Closer(self.curve, list(found)).crossings():
+        for one in closer.crossings():
             ends = (made[one.first].amplitude, made[one.last].amplitude)
             at = f"from {millimetres_between(min(ends), max(ends), 5)}"
+            whose = f"mode {one.mode}" if one.same_waves else f"mode {one.mode} of its wave"
             if one.width > LOCATED * (1.0 + ROUNDED):
-                said.append(f"{OVER} of harmonic {one.harmonic} {at}")
-            elif one.share > TAKES_PART:
-                said.append(f"{MEETS} of harmonic {one.harmonic} {at}")
+                said.append(f"{OVER} of harmonic {one.harmonic} with {whose} {at}")
+            elif one.takes_part:
+                said.append(f"{MEETS} of harmonic {one.harmonic} with {whose} {at}")
         return "".join(f"; {text}" for text in dict.fromkeys(said))
 
     def _ends(self, branch: Sequence[Followed], one: Followed) -> bool:
@@ -289,6 +312,24 @@ def mode_way(
     first, last = (float(np.log(a)) for a in span)
     route = Route(first=first, last=last, points=along.points)
     return ModeWay(curve, route, along.to_gross_slip)
+
+
+def most_damped(ratio: Sequence[float] | FloatArray, resonant: Sequence[int] | IntArray) -> int | None:
+    """Return the index of the largest damping ratio among points without an internal resonance, of all if there are no others; None without a solution.
+
+    Parameters
+    ----------
+    ratio
+        Damping ratio of each point, NaN without a solution.
+    resonant
+        Harmonic of each point by which another mode takes part, 0 without any; may be empty.
+    """
+    values = np.asarray(ratio, dtype=float)
+    alone = np.where(np.asarray(resonant) > 0, np.nan, values) if len(resonant) else values
+    for each in (alone, values):
+        if np.any(np.isfinite(each)):
+            return int(np.nanargmax(each))
+    return None
 
 
 def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:

@@ -28,6 +28,8 @@ EXTREME = 1e-3  # relative difference of the top of a parabola from the largest 
 LOCATED = 0.01  # of ln a: interval in which a harmonic passes the frequency of another mode
 SILENT = 1e-6  # of the first harmonic: what a harmonic has that no force acts on
 TAKES_PART = 0.03  # of the speed of the first harmonic, by which another mode changes a harmonic as it is passed, from where it takes part
+AMPLIFIED = 0.1  # of that speed, which a harmonic has outside the mode's own shape: a damped resonance is passed over many points, with small changes
+REACHES = 0.05  # of that speed: around such a passage, points with more belong to the internal resonance
 MOST_ROWS = 400  # of a harmonic's block whose eigenvalues are counted
 SHORTEST = 1e-3  # of ln a: points are not set closer
 
@@ -47,6 +49,12 @@ class Crossing:
         its sign.
     width
         Length of the interval in ln a.
+    level
+        Velocity amplitude of that harmonic outside the mode's own shape, over that of the first harmonic.
+    mode
+        Number of the other mode, by frequency.
+    same_waves
+        Whether it is a mode of the same structure; on a wheel harmonics are other waves.
     """
 
     harmonic: int
@@ -54,6 +62,14 @@ class Crossing:
     last: int
     share: float
     width: float
+    level: float
+    mode: int
+    same_waves: bool
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether the other mode takes part in the motion."""
+        return self.share > TAKES_PART or self.level > AMPLIFIED
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +123,23 @@ class Closer:
             for k, (a, b) in enumerate(zip(one.negative, other.negative, strict=False), 2):
                 if a != b and max(self._speed(k, m.motion[k]) for m in (one, other)) > SILENT:
                     share = self._speed(k, other.motion[k] - one.motion[k])
-                    found.append(Crossing(k, i, i + 1, share, abs(other.p - one.p)))
+                    level = max(self._beside(k, m) for m in (one, other))
+                    width = abs(other.p - one.p)
+                    found.append(Crossing(k, i, i + 1, share, width, level, max(a, b), self._same_waves(k)))
+        return found
+
+    def resonant(self) -> list[int]:
+        """Return for each point the harmonic by which another mode takes part in the motion; 0 without any."""
+        found = [0] * len(self.branch)
+        for one in self.crossings():
+            if not one.takes_part:
+                continue
+            low, high = one.first, one.last
+            while low > 0 and self._reached(low - 1, one.harmonic):
+                low -= 1
+            while high < len(self.branch) - 1 and self._reached(high + 1, one.harmonic):
+                high += 1
+            found[low : high + 1] = [one.harmonic] * (high + 1 - low)
         return found
 
     # --- where ----------------------------------------------------------------------------------
@@ -151,6 +183,26 @@ class Closer:
                 yield from _of_top(p, own[i - 1 : i + 2], i)
 
     # --- what -----------------------------------------------------------------------------------
+
+    def _reached(self, i: int, harmonic: int) -> bool:
+        """Whether an internal resonance of a harmonic reaches a point."""
+        one = self.branch[i]
+        return one.converged and self._beside(harmonic, self._place(one)) > REACHES
+
+    def _beside(self, harmonic: int, place: _Place) -> float:
+        """Return the velocity amplitude of a harmonic outside the shape of the first one, over that of the first."""
+        if harmonic >= len(place.motion):
+            return 0.0
+        moving, own = place.motion[harmonic], place.motion[1]
+        if self._same_waves(harmonic):
+            mass = self.curve.problems[0].system.structure.of_harmonic(1).mass
+            moving = moving - own * (np.vdot(own, mass @ moving) / np.vdot(own, mass @ own))
+        return self._speed(harmonic, moving)
+
+    def _same_waves(self, harmonic: int) -> bool:
+        """Whether a harmonic moves the structure as the first one does."""
+        structure = self.curve.problems[0].system.structure
+        return structure.of_harmonic(harmonic) is structure.of_harmonic(1)
 
     def _pairs(self) -> Iterator[tuple[_Place, _Place]]:
         nothing = _Place(0.0, np.full(2, np.nan), np.zeros((0, 0), dtype=complex), ())
