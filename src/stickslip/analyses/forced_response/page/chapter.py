@@ -20,6 +20,7 @@ from stickslip.analyses.forced_response.page.contacts import (
 )
 from stickslip.analyses.forced_response.page.curves import abscissa, frequency_response, low_order, of_each_order
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
+from stickslip.analyses.forced_response.page.friction_ratio import friction_ratio_t, friction_ratio_w
 from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
 from stickslip.analyses.forced_response.page.motion import in_motion
@@ -262,6 +263,7 @@ SECTION: Section = Section(
             "Contacts at the peak",
             (chosen_case, in_motion, state_map, surface_map, hysteresis_t, hysteresis_w, energy, bodies),
         ),
+        Block("friction_ratio", "T/N at the contacts", (chosen_case, friction_ratio_t, friction_ratio_w), folded=True),
         Block("cases", "Cases", (peaks,), folded=True),
         Block(
             "checks",

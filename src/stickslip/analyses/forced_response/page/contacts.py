@@ -60,7 +60,8 @@ def _stated(response: Response) -> tuple[ShownCase, ...]:
     return tuple(c for c in response.peaked if np.any(states(response, c) >= 0))
 
 
-def _state_keys() -> list[go.Scatter]:
+def state_keys() -> list[go.Scatter]:
+    """Return the legend entries of stick, slip and open."""
     return [
         go.Scatter(
             x=[None],
@@ -73,7 +74,7 @@ def _state_keys() -> list[go.Scatter]:
     ]
 
 
-def _drawn_samples(curves: int, samples: int) -> slice:
+def drawn_samples(curves: int, samples: int) -> slice:
     """Return the samples of a period to draw: with many curves every second, fourth ... one, to keep the page small."""
     step = 2 if samples >= 2 * 64 else 1
     while curves * samples // step > _MOST_SAMPLES and samples // (2 * step) >= _FEWEST_SAMPLES:
@@ -177,7 +178,7 @@ def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points
     gaps = {k: 1e6 * one.peak_gap[points, column] for k, one in own.items()}
     forces = {k: one.peak_force[points, column] for k, one in own.items()}
     moved, pulled = (_about_mean(list(of.values())) for of in (gaps, forces))
-    at = _drawn_samples(len(cases) * len(points), own[cases[0].index].peak_gap.shape[-1])
+    at = drawn_samples(len(cases) * len(points), own[cases[0].index].peak_gap.shape[-1])
     stated, places = _stated(response), [(i, j) for i, row in enumerate(rows) for j in range(len(row))]
     for case in cases:
         state = own[case.index].peak_state[points, column][:, at] if case in stated else None
@@ -189,7 +190,7 @@ def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points
             known = state[n] if state is not None else None
             loop = _loop(gap[n, at], force[n, at], known, names[points[n]])
             figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
-    for trace in _state_keys() if stated else []:
+    for trace in state_keys() if stated else []:
         figure.add_trace(trace, row=1, col=1)
     styled(figure, 130 + 215 * len(rows))
     legend_above(figure)
@@ -261,7 +262,7 @@ def state_map(response: Response) -> Plot | None:
     if not cases:
         return None
     rows, labels = _state_rows(response, cases)
-    at = _drawn_samples(len(cases) * len(rows), states(response, cases[0]).shape[-1])
+    at = drawn_samples(len(cases) * len(rows), states(response, cases[0]).shape[-1])
     figure = go.Figure()
     for case in cases:
         state = states(response, case)[..., at]
@@ -278,7 +279,7 @@ def state_map(response: Response) -> Plot | None:
             meta=case.index,
             hovertemplate="%{y} at %{x:.3f} T: %{z} (0 stick, 1 slip, 2 open)<extra></extra>",
         )
-    figure.add_traces(_state_keys())
+    figure.add_traces(state_keys())
     styled(figure, 130 + min(21 * len(rows), 900))
     legend_above(figure)
     figure.update_xaxes(title_text="time / period", range=[0, 1], showgrid=False)

@@ -155,6 +155,9 @@ class PeakPeriod:
     peak_gap: FloatArray = column("m", "contact gap at the peak", along="case contact direction sample")
     peak_force: FloatArray = column("N", "contact force at the peak", along="case contact direction sample")
     peak_state: IntArray = column("1", "contact state at the peak, -1 if none", along="case contact tangent sample")
+    peak_friction: FloatArray | None = column(
+        "1", "friction coefficient of the contact, NaN if its law has none", along="case contact", default=None
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

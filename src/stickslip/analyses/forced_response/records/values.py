@@ -255,14 +255,25 @@ def _of_fields(question: Question, response: Response) -> Values:
 
 
 def _of_peak(question: Question, response: Response) -> Values:
+    laws = question.problem.system.interface.laws
+    friction = np.array([getattr(law, "mu", np.nan) for law in laws], dtype=float)
     if response.top is None:
         n, samples = len(question.model.contacts.names), question.sweep.samples
         lost = np.full((n, 3, samples), np.nan)
         state = np.full((n, 2, samples), -1)
-        return stored(PeakPeriod(peak_time=lost[0, 0], peak_gap=lost, peak_force=lost, peak_state=state))
+        nothing = PeakPeriod(
+            peak_time=lost[0, 0], peak_gap=lost, peak_force=lost, peak_state=state, peak_friction=friction
+        )
+        return stored(nothing)
     period = signals(question.problem, response.top.point)
     return stored(
-        PeakPeriod(peak_time=period.time, peak_gap=period.gap, peak_force=period.force, peak_state=period.state)
+        PeakPeriod(
+            peak_time=period.time,
+            peak_gap=period.gap,
+            peak_force=period.force,
+            peak_state=period.state,
+            peak_friction=friction,
+        )
     )
 
 
