@@ -19,8 +19,11 @@ from typer.testing import CliRunner
 import stickslip as ss
 from stickslip.api.model import Model
 from stickslip.arrays import ComplexArray
+from stickslip.assembly import part_reduction
+from stickslip.assembly.assembling import assemble
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.full_field import nodes_of
+from stickslip.assembly.scene import scene_of
 from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
 from stickslip.cli import app
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -434,3 +437,20 @@ def test_what_pages_draw_of_a_sector_moves_as_the_wave_of_the_unreduced_wheel(wh
     at = KDTree(nodes.points).query(data["drawn_point"].values[0])[1]
     found = drawn(data, "peak_drawn_motion")
     assert np.abs(found - nodes.of(wanted)[at]).max() < 1e-5 * np.abs(wanted).max()
+
+
+def test_pictures_of_a_model_use_its_reduction_again(beams, monkeypatch):
+    folder, _, _ = beams
+    model, counted = ss.Study.from_file(folder / "study.toml").model(), []
+    reduce = part_reduction._reduce
+
+    def counting(name, *others):
+        counted.append(name)
+        return reduce(name, *others)
+
+    monkeypatch.setattr(part_reduction, "_reduce", counting)
+    assemble(model, 1)
+    assert counted == ["one"]  # its copy shares it
+    scene = scene_of(model, 1)
+    assert scene.moving is not None
+    assert counted == ["one"]

@@ -1,4 +1,6 @@
-"""Loops on the page: the six that dissipate most, the others folded away, means out of the picture."""
+"""Loops on the page: the six that dissipate most, the others folded away, means out of the picture; speeds and stability in its curves."""
+
+import itertools
 
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ from synthetic_result import provenance, synthetic_result, tree_of
 
 from stickslip.analyses.forced_response.page.chapter import peaks
 from stickslip.analyses.forced_response.page.contacts import SHOWN_LOOPS, hysteresis_t
+from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.page import report_html
 
 
@@ -61,3 +65,34 @@ def test_a_response_over_speed_tells_its_peaks_in_rpm() -> None:
     table, (case,) = peaks(view), view.cases
     at = list(table.head).index("at (rpm)")
     assert float(table.rows[0][at].replace("\u202f", "")) == pytest.approx(10 * view.peak_hz(case), abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("words", "kinds"),
+    [
+        (["stable"], []),
+        (["stable", "unstable"], ["stable", "unstable"]),
+        (["stable", "neutral", "not examined"], ["stable", "stability not known"]),
+        (["undecided"], ["stability not known"]),
+        (["stable", "unstable", "undecided"], ["stable", "unstable", "stability not known"]),
+    ],
+)
+def test_curves_are_solid_dashed_or_thin_by_stability(words: list[str], kinds: list[str]) -> None:
+    data = synthetic_result(ratios=(20,), n=24)
+    count = data.sizes["point"]
+    numbers = [MOTION[words[k * len(words) // count]] for k in range(count)]
+    plot = frequency_response(Response(data.assign(motion_stability=("point", numbers))))
+    assert plot is not None
+    keys = [t for t in plot.figure.data if t.legendgroup == "motion"]
+    assert [t.name for t in keys] == kinds
+    looks = {"stable": (1.8, "solid"), "unstable": (1.8, "dash"), "stability not known": (0.7, "solid")}
+    assert [(t.line.width, t.line.dash) for t in keys] == [looks[kind] for kind in kinds]
+    drawn = [t for t in plot.figure.data if t.mode == "lines" and t.legendgroup == "cases"]
+    assert [(t.line.width, t.line.dash) for t in drawn] == [looks[kind] for kind in kinds]
+    (curve,) = [t for t in plot.figure.data if t.name == "response"]
+    assert curve.mode == ("markers" if kinds else "lines+markers")
+    # each step of the curve is drawn once
+    order = np.argsort(data["frequency_hz"].values)
+    steps = [(a, b) for t in drawn for a, b in zip(t.x[::3], t.x[1::3], strict=True)]
+    at = data["frequency_hz"].values[order]
+    assert sorted(steps) == (list(itertools.pairwise(at)) if kinds else [])

@@ -23,7 +23,8 @@ from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 REMEMBERED = 4  # reductions of a part that are kept in memory
-MOST_BASIS_BYTES = 100_000_000  # of a way back to all dofs that is kept with them
+LAST = "last, with its way back"
+MOST_BASIS_BYTES = 100_000_000  # of that way back to all dofs
 
 
 @dataclass(frozen=True)
@@ -228,6 +229,9 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
     shared = None if rest.unit is None else rest.unit.tobytes()
     whole = store is with_ways_back
     key = (spin, shared, kept.tobytes(), whole)
+    if whole and part.memo.get(LAST, (None,))[0] == key:
+        last: ReducedPart = part.memo[LAST][1]
+        return last
     if key not in part.memo:
 
         def make() -> ReducedPart:
@@ -235,7 +239,7 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
             with step(f"reducing part {name}: {n} dofs to {kept.size} of contacts, loads and outputs, and modes", n):
                 made = _reduce(name, part, kept, spin, rest)
             if not whole and _small(made.structure.basis):
-                part.memo[(*key[:-1], True)] = made  # the motion of pictures needs it after the response
+                part.memo[LAST] = (*key[:-1], True), made  # the motion of pictures needs it next
             return made if whole else replace(made, structure=replace(made.structure, basis=None))
 
         if part.reduction is None or part.body is not None or whole:

@@ -16,7 +16,7 @@ from stickslip.analyses.forced_response.summary import amplitude_name, orders_se
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import CASE, ShownCase
-from stickslip.report.plot import ALARM, GRID, Plot, key_marker, log_ticks, styled
+from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.verdict import POINT_LEVELS
 
@@ -64,7 +64,7 @@ def _curve(response: Response, case: ShownCase, name: str) -> go.Scatter:
     return go.Scatter(
         x=x[at],
         y=response.accepted[at] * scale.factor,
-        mode="markers" if response.unstable[at].any() else "lines+markers",
+        mode="markers" if _marked(response) else "lines+markers",
         name=name if len(response.cases) > 1 else "response",
         legendgroup="cases",
         legendgrouptitle={"text": CASE} if len(response.cases) > 1 else None,
@@ -83,25 +83,57 @@ def _curve(response: Response, case: ShownCase, name: str) -> go.Scatter:
     )
 
 
+STABLE, UNSTABLE, UNKNOWN = "stable", "unstable", "stability not known"
+MARKS = {
+    STABLE: {"width": 1.8, "dash": "solid"},
+    UNSTABLE: {"width": 1.8, "dash": "dash"},
+    UNKNOWN: {"width": 0.7, "dash": "solid"},
+}  # as the literature draws branches
+
+
+def _marked(response: Response) -> bool:
+    """Return whether curves are drawn by stability: where a result holds a point that is not known to be stable."""
+    return bool((response.unstable | response.unknown_stability).any())
+
+
 def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
-    """Return a curve as two lines, the second one dashed along unstable points; none without points."""
-    at, x = response.points(case), abscissa(response)[0]
-    off, y = response.unstable[at], response.accepted[at] * response.scale.factor
-    if not off.any():
+    """Return a curve as lines by stability; none where every point is known to be stable, or stability was not asked for."""
+    if not _marked(response):
         return []
+    at, x = response.points(case), abscissa(response)[0]
+    y = response.accepted[at] * response.scale.factor
+    off, unknown = response.unstable[at], response.unknown_stability[at]
     dashed = off[1:] | off[:-1]
+    thin = (unknown[1:] | unknown[:-1]) & ~dashed
     drawn = []
-    for chosen, dash in ((~dashed, "solid"), (dashed, "dash")):
+    for chosen, kind in ((~dashed & ~thin, STABLE), (dashed, UNSTABLE), (thin, UNKNOWN)):
         steps = np.flatnonzero(chosen)
+        if not steps.size:
+            continue
         gap = np.full(steps.size, np.nan)
         rows = [np.column_stack([own[steps], own[steps + 1], gap]).ravel() for own in (x[at], y)]
-        line = {"color": case.colour, "width": 1.6, "dash": dash}
+        line = {"color": case.colour, **MARKS[kind]}
         drawn.append(
             go.Scatter(
                 x=rows[0], y=rows[1], mode="lines", line=line, showlegend=False, hoverinfo="skip", legendgroup="cases"
             )
         )
     return drawn
+
+
+def _stability_keys(response: Response) -> list[go.Scatter]:
+    """Return the legend of the lines of `_lines`."""
+    if not _marked(response):
+        return []
+    known = ~(response.unstable | response.unknown_stability)
+    there = {STABLE: known.any(), UNSTABLE: response.unstable.any(), UNKNOWN: response.unknown_stability.any()}
+    return [
+        go.Scatter(
+            x=[None], y=[None], mode="lines", name=kind, legendgroup="motion", line={"color": MUTED, **MARKS[kind]}
+        )
+        for kind, some in there.items()
+        if some
+    ]
 
 
 def _symbols(response: Response) -> np.ndarray:
@@ -187,6 +219,9 @@ def _caption(response: Response) -> str:
     if response.unstable.any():
         n = counted(int(response.unstable.sum()), "point")
         text += f" Dashed: {n} whose motion is unstable, so that a machine does not stay there."
+    if response.unknown_stability.any():
+        n = counted(int(response.unknown_stability.sum()), "point")
+        text += f" Thin: {n} whose stability was not examined or not decided."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
         text += f" {n} did not converge (crosses); the curve is left open there."
@@ -268,6 +303,7 @@ def frequency_response(response: Response) -> Plot | None:
         return None
     scale, shown = response.scale, panels(response)
     figure, told = _in_panels(response, shown) if shown else _many(response)
+    figure.add_traces(_stability_keys(response))
     if response.decides:
         low, more = response.low_name, response.more_name
         figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))

@@ -177,8 +177,18 @@ class Response(Node):
     @cached_property
     def unstable(self) -> npt.NDArray[np.bool_]:
         """(point,) True for motions known to be unstable."""
+        return np.asarray(self._stability == MOTION["unstable"])
+
+    @cached_property
+    def unknown_stability(self) -> npt.NDArray[np.bool_]:
+        """(point,) True for motions that were not examined, or remain undecided; false everywhere in results without stability."""
+        return np.isin(self._stability, (MOTION["undecided"], MOTION["not examined"]))
+
+    @cached_property
+    def _stability(self) -> IntArray:
+        """(point,) stability of each motion, as in `MOTION`; -1 in results without it."""
         found = read(PointStability, self.data).motion_stability
-        return np.asarray(found == MOTION["unstable"]) if found.size else np.zeros(self.hz.size, dtype=bool)
+        return found if found.size else np.full(self.hz.size, -1)
 
     def peak_is(self, case: ShownCase) -> str:
         """Return the stability of a case's peak in a word or two."""
