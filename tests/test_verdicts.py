@@ -630,6 +630,19 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
     one = xr.DataTree.from_dict({"forced_response": data.isel(case=[2])})
     assert "forced response: wrong. See" in not_trusted(one)
     assert of_tree(tree) == (doubt("rough"),)
+    left = Verdict(
+        "doubtful", "", None, "EO 18 rises", "Raise campbell.modes, now 4.", not_judged="EO 18 above 9368 rpm"
+    )
+    assert from_json(to_json([left])) == (left,)
+    waves = xr.Dataset(attrs={"verdicts": to_json([left])})
+    assert not_trusted(xr.DataTree.from_dict({"campbell": waves})) == ""
+    told = "EO 18 above 9368 rpm not judged (raise campbell.modes, now 4). The rest is trusted."
+    assert conclusion(xr.DataTree.from_dict({"campbell": waves})) == told
+    # what was judged and is doubtful goes first
+    both = xr.DataTree.from_dict(
+        {"campbell": waves, "modes": xr.Dataset(attrs={"verdicts": to_json([doubt("rough")])})}
+    )
+    assert conclusion(both) == "Not to be trusted as it stands: modes: doubtful. See the verdicts."
 
 
 def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_python(tmp_path: Path) -> None:

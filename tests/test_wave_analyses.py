@@ -33,7 +33,7 @@ from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
 from stickslip.study.run import answer, run_study
 from stickslip.study.store.netcdf import one_case
-from stickslip.study.verdict import of_tree, stored
+from stickslip.study.verdict import conclusion, of_tree, stored
 from stickslip.units import RPM
 
 STEEL = """
@@ -166,6 +166,7 @@ def test_engine_orders_above_the_computed_modes_are_not_called_clear(tmp_path: P
     said = outcome.verdicts[0].sentence
     assert "Engine orders 14 are not judged; with the margin they excite nodal diameters 2 at 1400 Hz" in said
     assert "Raise safe.modes, now 2, to" in said
+    assert conclusion(outcome.tree).startswith("EO 14 not judged (raise safe.modes, now 2, to ")
     data = outcome.tree["safe"]
     order = data.pair_engine_order.values
     np.testing.assert_array_equal(data.pair_judged.values, order != 14)
@@ -219,6 +220,9 @@ def test_engine_orders_above_the_followed_modes_are_named(tmp_path: Path) -> Non
     said = "\n".join(map(str, outcome.verdicts))
     assert "engine orders are not judged: " in said
     assert "Raise campbell.modes, now 2" in said
+    assert [v.not_judged[:12] for v in outcome.verdicts if v.not_judged] == ["EO 10 above "]
+    # the displacement is too large at that speed, which doubts what was judged
+    assert conclusion(outcome.tree) == "Not to be trusted as it stands: campbell: doubtful. See the verdicts."
     data = one_case(outcome.tree["campbell"].to_dataset(), 0)
     orders, speeds = data.unfollowed_engine_order.values, data.unfollowed_from_rpm.values
     at = dict(zip(orders.tolist(), speeds.tolist(), strict=True))

@@ -153,11 +153,30 @@ def test_choosing_a_case_shows_its_chapter(browser: Browser, tmp_path: Path) -> 
     assert marks(opened.figure("diameters_1")) > 10
 
 
+@needs_browser
+def test_a_narrow_screen_shows_the_whole_wheel_and_upright_numbers(browser: Browser, folder: Path) -> None:
+    browser.width(400)
+    browser.open(folder / "report.html")
+    drawn = "document.getElementById('plot-shapes')._fullLayout"
+    assert browser.until(f"{drawn}.scene.domain.y[0] > 0 && document.body.dataset.shapes")
+    size = f"(({drawn}._size.w) / ({drawn}._size.h * (1 - {drawn}.scene.domain.y[0])))"
+    # at 2.2 the wheel fills a square
+    assert browser.until(f"{drawn}.scene.aspectratio.x <= 2.2 * Math.min(1, {size}) + 1e-6")
+    assert browser.run("document.getElementById('plot-shapes').data[0].colorbar.orientation") == "h"
+    assert browser.run("document.getElementById('plot-shapes').data[0].showscale") is True
+    angles = (
+        "['diameters', 'safe', 'campbell'].map(k => document.getElementById(`plot-${k}`)._fullLayout.xaxis.tickangle)"
+    )
+    assert browser.run(angles) == [0, 0, 0]
+    assert browser.run("document.documentElement.scrollWidth") <= 400
+    browser.width(1200)
+
+
 def test_every_line_of_a_campbell_diagram_can_be_told_without_colours() -> None:
     plot = campbell_diagram(view(Campbell, campbell_result()))
     lines = [t for t in plot.figure.data if t.mode == "lines+markers+text"]
     labels = [[text for text in line.text if text] for line in lines]
-    assert labels == [[f"ND {k}, {m}"] for k in (2, 3) for m in (1, 2, 3)]
+    assert labels == [[f"ND {k}: {m}"] for k in (2, 3) for m in (1, 2, 3)]
     symbols = {line.name: line.marker.symbol for line in lines}
     assert len(set(symbols.values())) == 2
     # labels at one speed stand apart by the height of a letter at least
@@ -166,6 +185,16 @@ def test_every_line_of_a_campbell_diagram_can_be_told_without_colours() -> None:
     heights = [(i, y + 0.02 * top * (1 if "top" in place else -1)) for i, y, place in at]
     for n, (i, one) in enumerate(heights):
         assert all(i != j or abs(one - other) > 0.04 * top for j, other in heights[:n])
+
+
+def test_lines_of_waves_that_coincide_share_a_label() -> None:
+    data = campbell_result()
+    close = data["frequency_hz"].values.copy()
+    close[0, 1, :, 1] = close[0, 0, :, 1] * 1.001
+    found = campbell_diagram(view(Campbell, data.assign(frequency_hz=(data["frequency_hz"].dims, close)))).figure
+    lines = [t for t in found.data if t.mode == "lines+markers+text"]
+    texts = [[text for text in line.text if text] for line in lines]
+    assert texts == [["ND 2: 1"], ["ND 2, 3: 2"], ["ND 2: 3"], ["ND 3: 1"], [], ["ND 3: 3"]]
 
 
 def test_orders_that_leave_the_picture_or_the_modes_are_named() -> None:

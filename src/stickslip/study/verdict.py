@@ -40,6 +40,9 @@ class Verdict:
         Remedy in whole sentences; empty for none.
     warns
         Whether a trusted answer is a warning, such as a wheel that flutters.
+    not_judged
+        Name of the part of a question that has no answer, such as ``EO 18 above 9368 rpm``; the rest of the answer does not depend on
+        it. Empty: the verdict is on an answer.
     """
 
     level: Level
@@ -48,6 +51,7 @@ class Verdict:
     why: str = ""
     remedy: str = ""
     warns: bool = False
+    not_judged: str = ""
 
     @property
     def rank(self) -> int:
@@ -108,12 +112,12 @@ def worst(levels: Iterable[Level]) -> Level:
 
 def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdict, ...]:
     """Return verdicts in their order. One that is the same for several whole cases appears once, without a case."""
-    cases: dict[tuple[Any, ...], list[str]] = {}
+    cases: dict[Verdict, list[str]] = {}
     for v in each:
-        cases.setdefault((v.level, v.frequency_hz, v.why, v.remedy, v.warns), []).append(v.case)
+        cases.setdefault(replace(v, case=""), []).append(v.case)
     found: dict[Verdict, None] = {}
     for v in each:
-        known = set(cases[v.level, v.frequency_hz, v.why, v.remedy, v.warns])
+        known = set(cases[replace(v, case="")])
         everywhere = v.told and v.frequency_hz is None and len(labels) > 1 and known >= set(labels)
         found[replace(v, case="") if everywhere else v] = None
     return tuple(found)
@@ -172,7 +176,8 @@ def _gist(text: str) -> str:
 
 def to_json(verdicts: Iterable[Verdict]) -> str:
     """Return verdicts as the text of a JSON list."""
-    return json.dumps([asdict(v) for v in verdicts])
+    each = (asdict(v) for v in verdicts)
+    return json.dumps([{k: own[k] for k in own if own[k] or k != "not_judged"} for own in each])
 
 
 def from_json(text: str) -> tuple[Verdict, ...]:
@@ -221,19 +226,33 @@ def conclusion(tree: xr.DataTree) -> str:
         return told
     warnings = sum(v.word == "warning" for v in of_tree(tree))
     head = f"{warnings} warning{'s' * (warnings > 1)}, see the verdicts. " if warnings else ""
+    left = _not_judged(tree)
+    head += f"{left} " * bool(left)
     found = [node["verdict"].values for node in tree.children.values() if "verdict" in node]
     every = np.concatenate([np.zeros(0, dtype=np.int64), *found])
     counts = {POINT_LEVELS[k]: int(np.sum(every == k)) for k in (2, 1, 3)}
     off = ", ".join(f"{n} {level}" for level, n in counts.items() if n)
     if not off:
-        return f"{head}Every answer is trusted."
+        return f"{head}{'The rest' if left else 'Every answer'} is trusted."
     return f"{head}Every case is trusted; of {every.size} points {off}, none of them the peak of its case."
+
+
+def _not_judged(tree: xr.DataTree) -> str:
+    """Name the parts of questions that have no answer, with the remedy of each; empty for none."""
+    found: dict[str, list[str]] = {}
+    for v in of_tree(tree):
+        if v.not_judged:
+            remedy = v.remedy[:1].lower() + v.remedy[1:].removesuffix(".")
+            found.setdefault(remedy, []).append(said(v.case, v.not_judged))
+    return "; ".join(f"{' and '.join(names)} not judged ({remedy})" for remedy, names in found.items()) + "." * bool(
+        found
+    )
 
 
 def _not_trusted(name: str, data: xr.Dataset) -> str:
     words = name.replace("_", " ")
     if "case_verdict" not in data:
-        level = worst(v.level for v in stored(data.attrs))
+        level = worst(v.level for v in stored(data.attrs) if not v.not_judged)
         return "" if level == "trusted" else f"{words}: {level}"
     levels = data["case_verdict"].values
     if not np.any(levels):

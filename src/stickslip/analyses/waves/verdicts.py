@@ -94,7 +94,7 @@ def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
     excited = [m * per_order for m in orders]
     why = f"engine orders {in_ranges(orders)} are not judged; with the margin they excite nodal diameters {in_ranges(diameters)} at {_span(excited)} Hz, above the highest computed modes ({_span(list(highest.values()))} Hz)"
     remedy = f"Raise safe.modes, now {n_modes}, to {_more(n_modes, ratio)} or more."
-    return (Verdict("doubtful", why=why, remedy=remedy),)
+    return (Verdict("doubtful", why=why, remedy=remedy, not_judged=f"EO {in_ranges(orders)}"),)
 
 
 def campbell_doubts(
@@ -119,14 +119,16 @@ def campbell_doubts(
             f"above the followed modes of the nodal diameters that they excite, engine orders are not judged: {named}; other "
             "modes may cross them there"
         )
-        said.append((why, f"Raise campbell.modes, now {n_modes}."))
+        short = ", ".join(f"EO {m} above {rpm:.4g} rpm" for m, rpm in unfollowed)
+        said.append((why, f"Raise campbell.modes, now {n_modes}.", short))
     if unseen:
         why = (
             f"engine orders {in_ranges(unseen)} have no crossings here, because campbell.nodal_diameters leaves out the nodal "
             "diameters that they excite"
         )
-        said.append((why, "Add these, or leave the key out."))
-    return tuple(Verdict("doubtful", why=why, remedy=remedy) for why, remedy in said)
+        remedy = "Add their nodal diameters to campbell.nodal_diameters, or leave this key out."
+        said.append((why, remedy, f"EO {in_ranges(unseen)}"))
+    return tuple(Verdict("doubtful", why=why, remedy=remedy, not_judged=short) for why, remedy, short in said)
 
 
 def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float | None:

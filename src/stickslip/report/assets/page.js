@@ -13,6 +13,16 @@ document.querySelectorAll(".chooser button").forEach(button => button.addEventLi
 }));
 document.querySelectorAll(".chooser select").forEach(list => list.addEventListener(
   "change", () => choose(list.closest("section"), list.value)));
+// on a narrow screen numbers along an axis stay upright, and as many as there is room for
+if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
+  const all = plot._fullLayout || {}, change = {};
+  Object.keys(all).filter(name => /^xaxis\d*$/.test(name) && all[name].type === "linear" && all[name].tickmode !== "array").forEach(name => {
+    const {range, dtick, tickmode, _length} = all[name], most = Math.max(2, _length / 24), span = Math.abs(range[1] - range[0]);
+    change[`${name}.tickangle`] = 0;
+    if (tickmode === "linear") change[`${name}.dtick`] = [1, 2, 5, 10, 20, 50].map(k => k * dtick).find(step => span / step < most) || dtick;
+  });
+  if (Object.keys(change).length) Plotly.relayout(plot, change);
+});
 // on a narrow screen a legend beside the panel would leave it half the width: it stands below, and the figure grows by its height
 if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
   const whole = plot._fullLayout || {}, legend = whole.legend || {}; // what a template says stands nowhere else

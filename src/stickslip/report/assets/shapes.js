@@ -83,7 +83,7 @@ document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
     }
     return [...out, intensity];
   };
-  let shown = "";
+  let shown = "", fitted = 1; // of the width that the wheel needs at full size
   const draw = () => {
     const get = name => form.elements[name].value, name = get("view"), v = view(name);
     const wave = Number(get("wave")), mode = Number(get("mode"));
@@ -92,12 +92,13 @@ document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
     const title = `${data.waves[wave]}, mode ${mode + 1}: ${data.hertz[wave][mode]} Hz`;
     const change = {x: [x], y: [y], z: [z], intensity: [intensity]}, layout = {};
     if (plot.layout.title.text !== title) layout["title.text"] = title;
-    if (shown !== name) {
+    const {_size, scene} = plot._fullLayout, fit = Math.min(1, _size.w / (_size.h * (scene.domain.y[1] - scene.domain.y[0])));
+    if (shown !== name || fitted !== fit) {
       Object.assign(change, {i: [v.i], j: [v.j], k: [v.k]});
       const size = {}, margin = 0.1 * v.span, longest = v.span + 2 * margin;
       ["x", "y", "z"].forEach((a, d) => {
         layout[`scene.${a}axis.range`] = [v.low[d] - margin, v.high[d] + margin];
-        size[a] = 2.2 * (v.high[d] - v.low[d] + 2 * margin) / longest;
+        size[a] = 2.2 * fit * (v.high[d] - v.low[d] + 2 * margin) / longest;
       });
       layout["scene.aspectratio"] = size;
       const [a, b, c] = data.axis;  // look along the wheel's axis at a slant, on the sector from the side
@@ -106,7 +107,7 @@ document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
       const xyz = v3 => ({x: v3[0], y: v3[1], z: v3[2]});
       layout["scene.camera.eye"] = xyz(eye);
       layout["scene.camera.up"] = xyz(up);
-      shown = name;
+      [shown, fitted] = [name, fit];
       document.body.dataset.shapes = `${name} ${v.nodes.length * v.copies}`;
       Plotly.restyle(plot, {visible: name === "sector"}, [1]);
     }
@@ -114,7 +115,19 @@ document.querySelectorAll('form.shapes[data-of="modes"]').forEach(form => {
     return Object.keys(layout).length ? done.then(() => Plotly.relayout(plot, layout)) : done;
   };
   [form.elements.wave.value, form.elements.mode.value] = data.shown;
-  player(form, draw);
+  // on a narrow screen the colour bar lies below the wheel, inside the plot: beside it, it would take a third
+  const width = plot.clientWidth, bar = 74, high = width + 44 + bar;
+  if (width < 560) {
+    plot.style.height = plot.parentElement.style.height = `${high}px`;
+    // plotly draws a turned colour bar over the old one unless that is taken away first
+    const turned = {
+      "colorbar.orientation": "h", "colorbar.len": 0.8, "colorbar.x": 0.5, "colorbar.xanchor": "center", "colorbar.y": 0,
+      "colorbar.yanchor": "bottom", "colorbar.title.text": "displacement / largest", "colorbar.title.side": "top", showscale: true,
+    };
+    Plotly.restyle(plot, {showscale: false}, [0])
+      .then(() => Plotly.update(plot, turned, {height: high, "scene.domain.y": [bar / (width + bar), 1]}, [0]))
+      .then(() => player(form, draw));
+  } else player(form, draw);
 });
 document.querySelectorAll('form.shapes[data-of="motion"]').forEach(form => {
   const figure = form.closest("figure"), plot = figure.querySelector(".js-plotly-plot");

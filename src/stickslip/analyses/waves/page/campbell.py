@@ -1,36 +1,61 @@
 """The Campbell diagram: frequencies over speed, engine-order lines, and their crossings."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, view_of
 from stickslip.analyses.waves.records import Campbell, contact_state, with_contacts
+from stickslip.analyses.waves.verdicts import in_ranges
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
+from stickslip.study.verdict import together
 
 _MOST_TOLD = 3  # crossings in the answer
 _DASHES = ("solid", "dot", "dashdot", "longdash")
 # a wave has its own, so that a print without colours can be read
 _SYMBOLS = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
+_BESIDE = 0.25  # of the width: labels nearer than this side by side would touch on a narrow screen
 _BAND = 0.02  # half the height of a label, and its distance from the line, as a share of the picture's height
 
 
-def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
-    """Return the label position of each line (wave, mode): index of the speed, and 1 above or -1 below.
+def _bundles(hz: FloatArray, top: float) -> IntArray:
+    """Return for each line (wave, mode) the first wave whose line of the same mode it coincides with at all speeds, within a label's half height."""
+    first = np.tile(np.arange(hz.shape[0])[:, None], (1, hz.shape[2]))
+    for w, mode in np.ndindex(*first.shape):
+        for other in range(w):
+            if first[other, mode] == other and np.all(np.abs(hz[w, :, mode] - hz[other, :, mode]) <= _BAND * top):
+                first[w, mode] = other
+                break
+    return first
 
-    It is the first speed at which neither another line nor another label is in the way.
+
+def _bundled(view: Waves[Campbell], waves: Sequence[int]) -> str:
+    """Return one name for waves whose lines coincide, such as ``ND 4, 6``."""
+    if len(waves) == 1 or view.both:
+        return together([view.waves[w] for w in waves])
+    return f"ND {in_ranges({view.found.waves[w].nodal_diameter for w in waves})}"
+
+
+def _label_places(hz: FloatArray, top: float, first: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the label position of each line (wave, mode): index of the speed, and 1 above or -1 below; side 0 for a line without a label.
+
+    It is the first speed at which neither another line nor another label is in the way. Lines that coincide share the label of the `first`.
     """
     speed, side = (np.zeros((hz.shape[0], hz.shape[2]), dtype=np.int64) for _ in range(2))
-    side += 1
+    side[first == np.arange(len(hz))[:, None]] = 1
     taken: list[tuple[int, float]] = []
-    for w, mode in np.ndindex(*speed.shape):
+    for w, mode in np.argwhere(side):
+        others_of = np.ones(side.shape, dtype=bool)
+        others_of[:, mode] = first[:, mode] != w
         for s, way in ((s, way) for s in range(hz.shape[1]) for way in (1, -1)):
             middle = float(hz[w, s, mode]) + way * _BAND * top
-            others = np.delete(hz[:, s].ravel(), w * hz.shape[2] + mode)
-            placed = np.array([y for other, y in taken if other == s])
+            others = hz[:, s][others_of]
+            placed = np.array([y for other, y in taken if abs(other - s) <= _BESIDE * (hz.shape[1] - 1)])
             free = np.all(np.abs(others - middle) > _BAND * top)
             if free and np.all(np.abs(placed - middle) > 2 * _BAND * top):
                 speed[w, mode], side[w, mode] = s, way
@@ -42,7 +67,13 @@ def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
 def _branches(view: Waves[Campbell]) -> list[go.Scatter]:
     rpm, hz = view.found.speeds_rpm, np.array([w.frequencies_hz for w in view.found.waves])
     pairs = zip(view.waves, view.colours, strict=True)
-    at, side = _label_places(hz, float(np.nanmax(hz)))
+    top = float(np.nanmax(hz))
+    first = _bundles(hz, top)
+    at, side = _label_places(hz, top, first)
+    texts = {
+        (w, mode): f"{_bundled(view, np.flatnonzero(first[:, mode] == w).tolist())}: {mode + 1}"
+        for w, mode in np.argwhere(side).tolist()
+    }
     return [
         go.Scatter(
             x=rpm,
@@ -51,8 +82,8 @@ def _branches(view: Waves[Campbell]) -> list[go.Scatter]:
             name=name,
             legendgroup=name,
             showlegend=mode == 0,
-            text=[f"{name}, {mode + 1}" if s == at[w, mode] else "" for s in range(len(rpm))],
-            textposition=f"{'top' if side[w, mode] > 0 else 'bottom'} {'center' if at[w, mode] else 'right'}",
+            text=[texts.get((w, mode), "") if s == at[w, mode] else "" for s in range(len(rpm))],
+            textposition=f"{'top' if side[w, mode] >= 0 else 'bottom'} {'center' if at[w, mode] else 'right'}",
             textfont={"size": 10, "color": colour},
             # beyond eight waves colours come again, dashed
             line={"color": colour, "width": 1.8, "dash": _DASHES[(w // 8) % len(_DASHES)]},
@@ -140,7 +171,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, {with_contacts('in the frame that turns with the wheel', view.found.contacts)}. "
-        f"Lines are labelled with wave and mode. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{_not_shown(view, top)}"
+        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 

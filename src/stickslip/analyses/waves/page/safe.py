@@ -101,6 +101,7 @@ def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) ->
         text=[f" EO {m} " for m in orders],
         textposition=list(places),
         textfont={"size": 11, "color": MUTED},
+        cliponaxis=False,
         marker={
             "symbol": ["square-x-open" if int(m) in unjudged else "square-open" for m in orders],
             "size": 8,
