@@ -161,7 +161,7 @@ def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mappi
 
 
 def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]) -> Outcome:
-    code = study.file.code
+    code = study.code
     versions = library_versions() | code.files
     origin = Provenance(study.title, study.text, versions, study_file=as_text(study.path.name))
     book = Book(origin, measured=study.measured)
@@ -270,7 +270,7 @@ def _order(study: Study, task: Task, place: Place) -> Order:
     """Return the job of a task for a worker."""
     job = Job(_label(task.analysis, task.case), _inputs(study, task))
     owner = "" if place.shard is None else new_owner()
-    own = study.file.code
+    own = study.code
     code = Shipped(own.home, own.files) if own.files else None
     return Order(task.analysis, job, task.sealed, task.case.checks, _limits(task), owner, code)
 

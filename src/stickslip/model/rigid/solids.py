@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from stickslip.arrays import FloatArray, IntArray
 
@@ -59,6 +58,8 @@ def from_faces(points: FloatArray, normals: FloatArray, centre: FloatArray) -> B
     BodySolid or None
         None where all of this lies in a plane.
     """
+    from scipy.spatial import ConvexHull, QhullError  # a study file is refused before it is loaded
+
     inward = np.einsum("pd,pd->p", centre - points, normals)
     every = np.vstack([points, points + inward[:, None] * normals])
     try:

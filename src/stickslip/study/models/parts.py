@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.assembly.contact import NEXT
 from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
@@ -21,11 +21,12 @@ from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_mesh import mesh_sector
-from stickslip.model.part import BodyPoints, Part, Place, damper_part, rigid_part, solid_part, structure_part
+from stickslip.model.part import BodyPoints, Part, Place, Reducing, damper_part, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
 from stickslip.model.rigid.sides import ContactPoints
+from stickslip.model.structure import Structure
 from stickslip.study.file.model.bodies import AXES, BODIES, Cylinder, FlatCurved, Placed, RigidBodyTable, Surface, Wedge
 from stickslip.study.file.model.material import ReductionTable
 from stickslip.study.file.model.parts import BeamTable, Copy, FileModel, Lumped, PrismBlades, Sector
@@ -33,6 +34,7 @@ from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
+from stickslip.study.own_code import is_address, made, of_address, state_of
 from stickslip.units import DEG
 
 LOG = logging.getLogger("stickslip")
@@ -40,6 +42,31 @@ REMEMBERED = 16  # parts that are kept in memory
 CHUNK = 1 << 20  # bytes of a file that are hashed at a time
 
 Memo = MutableMapping[str, Part]
+
+
+@dataclass(frozen=True)
+class OwnReduction:
+    """A reduction of the user.
+
+    Parameters
+    ----------
+    made
+        The reduction: a dataclass with `of` and `in_words`.
+    code
+        State of its code, on which reduced parts that are kept on disk depend.
+    """
+
+    made: Reducing
+    code: str
+
+    def of(self, structure: Structure, keep: IntArray) -> Structure:
+        """Return a structure reduced to the dofs `keep` and whatever the user adds."""
+        return self.made.of(structure, keep)
+
+    @property
+    def in_words(self) -> str:
+        """Method in words."""
+        return self.made.in_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +125,8 @@ class Workshop:
         reduction = table.reduction or self.tables.reduction or ReductionTable()
         found: dict[str, Any] = {}
         if reduced or table.reduction is not None:
-            found["reduction"] = reduction.library()
+            own = is_address(reduction.method)
+            found["reduction"] = _own_reduction(reduction.method) if own else reduction.library()
         damping = table.damping or self.tables.damping
         if damping is not None:
             found["damping"] = damping.library()
@@ -173,6 +201,10 @@ _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
     Cylinder: Workshop.cylinder,
     FileModel: Workshop.from_file,
 }
+
+
+def _own_reduction(address: str) -> OwnReduction:
+    return OwnReduction(made(of_address(address), address), state_of(address))
 
 
 def place_in_steps(steps: Sequence[Placed]) -> Place:

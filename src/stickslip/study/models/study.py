@@ -52,6 +52,11 @@ class Study:
         return self.file.tables
 
     @property
+    def code(self) -> OwnCode:
+        """Code of the user that the file names."""
+        return self.file.code
+
+    @property
     def title(self) -> str:
         """Title on one line; without a title the name of the file's folder."""
         return self.tables.title or self.file.home.name

@@ -1,23 +1,20 @@
 """The tables [material], [damping] and [reduction], of the whole study or of a part."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass
+from dataclasses import is_dataclass
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
 
-from stickslip.arrays import IntArray
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
-from stickslip.model.part import Reducing
 from stickslip.model.readers.units import MODULI, SOLIDS
-from stickslip.model.structure import Structure
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
 from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
-from stickslip.study.own_code import is_address, made, of_address, state_of
+from stickslip.study.own_code import is_address
 
 FEW = 25  # fixed-interface modes where the study does not say
 OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
@@ -55,31 +52,6 @@ class _PlausibleMaterial(Section):
 
 
 MaterialTable: Any = table_of(Material, base=_PlausibleMaterial, name="MaterialTable")
-
-
-@dataclass(frozen=True)
-class OwnReduction:
-    """A reduction of the user.
-
-    Parameters
-    ----------
-    made
-        The reduction: a dataclass with `of` and `in_words`.
-    code
-        State of its code, on which reduced parts that are kept on disk depend.
-    """
-
-    made: Reducing
-    code: str
-
-    def of(self, structure: Structure, keep: IntArray) -> Structure:
-        """Return a structure reduced to the dofs `keep` and whatever the user adds."""
-        return self.made.of(structure, keep)
-
-    @property
-    def in_words(self) -> str:
-        """Method in words."""
-        return self.made.in_words
 
 
 def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
@@ -151,10 +123,8 @@ class ReductionTable(Section):
             raise custom_error("is missing with rubin", "Give a number of modes, or up_to_hz.", "free_interface_modes")
         return self
 
-    def library(self) -> Reducing | None:
-        """Return the reduction; None for none."""
-        if is_address(self.method):
-            return OwnReduction(made(of_address(self.method), self.method), state_of(self.method))
+    def library(self) -> Reduction | None:
+        """Return the reduction; None for none. A reduction of the user is made where parts are."""
         if self.method == "none":
             return None
         return Reduction(self._n_modes(), self.method)
