@@ -83,6 +83,10 @@ class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
     """the range [lowest, highest] in Hz, the lower frequency first"""
     frequencies_hz: Sequence[float] | FloatArray | None
     """frequencies of your own in Hz instead of a range, growing"""
+    method: Literal["balance", "shooting"]
+    """balance: harmonic balance; shooting: each motion is found in time, as a state that repeats after a period, with multipliers and without harmonics, at equally spaced or listed frequencies; default 'balance'"""
+    steps_per_period: int | None
+    """time steps in a period for method = 'shooting', 64 to 65536; left out: 1024"""
     over: Literal["frequency", "speed"]
     """frequency: at the one speed of [rotation]; speed: along speed_rpm, at the engine order times the speed, with matrices and static loads from [rotation]; default 'frequency'"""
     speed_rpm: Sequence[float] | FloatArray | None

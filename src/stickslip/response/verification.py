@@ -104,6 +104,8 @@ def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor:
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     """Return the predicted relative change of a solution by its judging set: the estimate from the continuation, otherwise from Newton steps.
 
+    For a motion found by shooting it is the estimated error of the time step.
+
     Parameters
     ----------
     problem
@@ -118,6 +120,8 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
     """
     if not point.converged:
         return float("nan")
+    if point.shot:
+        return point.shot[0].error
     # in the published passages a strategy looks at nothing beyond its reference
     fed = judging_set(point.support, problem.driven)
     looked = problem.sweep.auto or set(fed) <= set(problem.high.harmonics)

@@ -19,6 +19,7 @@ from stickslip.analyses.forced_response.physics.limits import NAMED_MODES, Physi
 from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
 from stickslip.analyses.forced_response.problem import Question, question_of
 from stickslip.analyses.forced_response.records.pressures import pressure_lines
+from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
 from stickslip.analyses.forced_response.stability.stable import cost_lines
 from stickslip.arrays import FloatArray
@@ -72,6 +73,15 @@ def _computed(case: Case, model: Model, question: Question) -> tuple[str, ...]:
     return (
         f"sweep: {lowest:.2f} to {highest:.2f} Hz",
         *of_pressures(case, model),
+        *_of_method(case, model, question),
+    )
+
+
+def _of_method(case: Case, model: Model, question: Question) -> tuple[str, ...]:
+    """Return lines on balance or shooting."""
+    if question.stepping is not None:
+        return (*question.orders_lines, *shooting_lines(question.model, question.sweep, question.stepping))
+    return (
         *estimate(model, question.sweep).lines,
         *unreduced_line(question.model),
         *question.orders_lines,

@@ -31,6 +31,7 @@ from stickslip.analyses.forced_response.records.values import (
     of_examined,
     of_model,
     of_response,
+    of_shots,
 )
 from stickslip.analyses.forced_response.stability.bifurcating import (
     followed,
@@ -59,6 +60,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.by_shooting import shooting_response
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
@@ -149,16 +151,26 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
     lines = (*unreduced_line(model), *model.frequencies.lines()) if question.first else ()
     for line in lines:
         LOG.info(line)
-    for point in forced_response(model.system, model.load, question.sweep, done=done):
+    for point in _solved(question, done):
         yield point
         advance(*progress(point, question.sweep))
 
 
+def _solved(question: Question, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
+    """Return the missing points, by balance or by shooting."""
+    model, stepping = question.model, question.stepping
+    if stepping is None:
+        return forced_response(model.system, model.load, question.sweep, done=done)
+    return shooting_response(model.system, model.load, question.sweep, stepping, done)
+
+
 def _of_physics(question: Question, response: Response) -> Values:
-    """Return the properties of the modes of a case, and the sensitivity of its peak to the model."""
+    """Return the properties of the modes of a case, and the sensitivity of its peak to the model, which balances tell."""
+    told = of_physics(question, response) | motion_at_peak(question, response)
+    if question.stepping is not None:
+        return told
     return (
-        of_physics(question, response)
-        | motion_at_peak(question, response)
+        told
         | model_changes(question, response)
         | stiffness_changes(question, response)
         | motions_elsewhere(question, response)
@@ -172,7 +184,7 @@ def _store_notes(question: Question, response: Response, examined: Sequence[Exam
     shift = peak_shift(question, response)
     notes.put("model", of_model(question, response.output))
     told = stored(KnownVerdicts(known_verdicts=to_json(known(question, response, shift))))
-    notes.put("response", of_response(question, response, shift) | told)
+    notes.put("response", of_response(question, response, shift) | of_shots(response) | told)
     size = f"peak {millimetres(response.peak_amplitude)} at {response.peak_hz:.3f} Hz"
     peak = f"{size}, {peak_word(response, examined)}, {len(response.accepted)} points"
     if response.top is None:
@@ -261,7 +273,7 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     first, last = sweep.ends
     along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
-    if sweep.single:  # repeats come in between
+    if sweep.single or point.shot:  # repeats come in between, or none at all
         shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
     shares["check"] = shares["peak"]
     begin, width = shares.get(point.stage, (0.0, 0.95))

@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.chooser import Chooser, chooser_of
 from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
+from stickslip.analyses.forced_response.shooting import require_in_time, require_shooting, shooting_sweep, stepping_of
 from stickslip.analyses.forced_response.stability.examination import examines_every_wave
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.assembly.assembled import Assembled
@@ -32,6 +33,7 @@ from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
+from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analysis import Case
 from stickslip.study.file.harmonics import HIGHEST
@@ -62,7 +64,8 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
     table = settings.forced_response
     sweep = sweep_through(settings, table, _range(table, engine_order), driven)
     own = tuple(HZ * f for f in table.frequencies_hz or ())
-    return replace(sweep, at=own, frequencies=table.frequencies or 0)
+    sweep = replace(sweep, at=own, frequencies=table.frequencies or 0)
+    return shooting_sweep(settings, sweep, driven) if table.method == "shooting" else sweep
 
 
 def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]) -> Sweep:
@@ -174,6 +177,8 @@ class Question:
         Whether Jacobians with few and with many harmonics are compared at every point.
     scene
         What pictures show of the model; None without pictures.
+    stepping
+        Time steps of a response by shooting; None: by harmonic balance.
     """
 
     label: str
@@ -193,6 +198,7 @@ class Question:
     extent: Extent | None = None
     similarity: bool = False
     scene: Scene | None = None
+    stepping: TimeStepping | None = None
 
     @property
     def over_speed(self) -> bool:
@@ -280,12 +286,8 @@ def question_of(case: Case, model: Model) -> Question:
     settings = case.settings
     sweep = within_limits(model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits)
     sweep = measured(sweep, model)
-    _require_driven(model, sweep)
-    if IN_TIME in case.checks:
-        refuse_whole("--verify", model, "run without --verify")
-        _require_integrable(model)
-    _refuse_for_rigid(model, sweep, case.checks, settings.harmonics.similarity)
-    check_limits(settings.limits, estimate(model, sweep))
+    stepping = stepping_of(settings, sweep)
+    _refuse_beforehand(case, model, sweep, stepping)
     # solutions are judged towards up to three times the harmonics that are kept
     harmonics = JUDGED_MULTIPLE * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
@@ -299,9 +301,7 @@ def question_of(case: Case, model: Model) -> Question:
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:
         assembled = _with_frozen_sliders(assembled, share)
-    _require_coefficients(assembled, sweep)
-    if settings.harmonics.similarity:
-        _require_comparable(assembled, sweep)
+    _refuse_assembled(case, assembled, sweep, stepping)
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
@@ -325,7 +325,31 @@ def question_of(case: Case, model: Model) -> Question:
         not_periodic_points=settings.forced_response.not_periodic_points,
         rpm=model.speed / RPM,
         similarity=settings.harmonics.similarity,
+        stepping=stepping,
     )
+
+
+def _refuse_beforehand(case: Case, model: Model, sweep: Sweep, stepping: TimeStepping | None) -> None:
+    """Refuse what the model cannot answer, before it is assembled; `stepping` is that of a response by shooting."""
+    settings = case.settings
+    if stepping is not None:
+        require_shooting(settings, model, case.checks)
+        return
+    _require_driven(model, sweep)
+    if IN_TIME in case.checks:
+        refuse_whole("--verify", model, "run without --verify")
+        _require_integrable(model)
+    _refuse_for_rigid(model, sweep, case.checks, settings.harmonics.similarity)
+    check_limits(settings.limits, estimate(model, sweep))
+
+
+def _refuse_assembled(case: Case, assembled: Assembled, sweep: Sweep, stepping: TimeStepping | None) -> None:
+    """Refuse what the assembled model cannot answer."""
+    _require_coefficients(assembled, sweep)
+    if stepping is not None:
+        require_in_time(assembled, sweep, stepping)
+    if case.settings.harmonics.similarity:
+        _require_comparable(assembled, sweep)
 
 
 def _require_coefficients(model: Assembled, sweep: Sweep) -> None:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
 
 Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+STEPS = 1024  # of a period, by shooting
 RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
 
 
@@ -17,6 +18,17 @@ class ForcedResponse(Section):
     frequency_hz: Range | None = Field(None, description="the range [lowest, highest] in Hz, the lower frequency first")
     frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=10_000)] | None = Field(
         None, description="frequencies of your own in Hz instead of a range, growing"
+    )
+    method: Literal["balance", "shooting"] = Field(
+        "balance",
+        description="balance: harmonic balance; shooting: each motion is found in time, as a state that repeats after a period, with multipliers "
+        "and without harmonics, at equally spaced or listed frequencies",
+    )
+    steps_per_period: int | None = Field(
+        None,
+        ge=64,
+        le=65_536,
+        description=f'time steps in a period for method = "shooting", 64 to 65536; left out: {STEPS}',
     )
     over: Literal["frequency", "speed"] = Field(
         "frequency",
@@ -88,6 +100,7 @@ class ForcedResponse(Section):
         rising_pair(self.frequency_hz or [], "frequency_hz")
         rising_pair(self.speed_rpm or [], "speed_rpm", "speed")
         _check_list(self.frequencies_hz, self.frequencies)
+        _check_method(self)
         return self
 
 
@@ -98,3 +111,24 @@ def _check_list(own: list[float] | None, count: int | None) -> None:
         raise custom_error("cannot stand beside frequencies_hz", "Remove one of them.", "frequencies")
     if any(b <= a for a, b in pairwise(own)):
         raise custom_error("must grow", "Sort them, and give each once.", "frequencies_hz")
+
+
+def _check_method(table: ForcedResponse) -> None:
+    if table.method == "balance":
+        if table.steps_per_period is not None:
+            raise custom_error(
+                f"is for method = 'shooting', and method is 'balance', got {table.steps_per_period}",
+                'Remove it, or give method = "shooting".',
+                "steps_per_period",
+            )
+        return
+    for key, wanted, why in (
+        ("over", "frequency", "integrates at one speed"),
+        ("bifurcations", "off", "follows no branch"),
+    ):
+        if getattr(table, key) != wanted:
+            raise custom_error(
+                f"is {getattr(table, key)!r}, and method = 'shooting' {why}",
+                f'Give {key} = "{wanted}", or method = "balance".',
+                key,
+            )

@@ -18,6 +18,7 @@ from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Str
 from stickslip.response.continuation.branch import Judged, following_vibration
 from stickslip.response.forced.amplitude import amplitudes, error_measure
 from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.shot import Shot
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import STEPS_BETWEEN, Following, Point, start_point, step_to
@@ -74,6 +75,8 @@ class ForcedPoint:
         (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, otherwise 0; empty: all coordinates keep all harmonics.
     marched
         Results of time integration, in the order of `stickslip.response.forced.from_time.Marched`; empty without one.
+    shot
+        What shooting knows of the motion, for a response by shooting; empty for one by balance.
     """
 
     stage: Stage
@@ -95,10 +98,14 @@ class ForcedPoint:
     start: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     kept: IntArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     marched: FloatArray = field(default_factory=lambda: np.zeros(0))
+    shot: tuple[Shot, ...] = ()
 
     @property
     def unknowns(self) -> int:
-        """Real coefficients that were solved for."""
+        """Real coefficients that were solved for; by shooting the states."""
+        if self.shot:
+            (one,) = self.shot
+            return 2 * one.displacement.size + one.states.size
         if self.kept.size:
             return 2 * int(self.kept.sum()) - int(self.kept[0].sum())
         return (2 * int(self.harmonics.size) - 1) * int(self.coefficients.shape[1])

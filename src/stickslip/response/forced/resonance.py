@@ -74,7 +74,7 @@ def _refined(problem: ForcedProblem, search: "_Search", known: list[ForcedPoint]
             return
         top = int(np.argmax(heights))
         seam = _on_seam(known, top)
-        omega = known[top].omega if seam else _vertex(known, heights)
+        omega = known[top].omega if seam else peak_vertex(known, heights)
         if omega is None:
             return
         aside = top - 1 if omega <= known[top].omega else min(top + 1, len(known) - 1)
@@ -245,7 +245,7 @@ def _on_seam(known: Sequence[ForcedPoint], top: int) -> bool:
     return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)
 
 
-def _vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
+def peak_vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
     """Return the next frequency in the search for the peak; None when it is resolved, at the ends of the branch, or beside a fold."""
     top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):

@@ -7,6 +7,7 @@ from stickslip.analyses.forced_response.page.bodies import bodies, energy
 from stickslip.analyses.forced_response.page.checks import (
     amplitudes_in_time,
     retention,
+    shooting,
     stability,
     statistics_in_time,
     time_integration,
@@ -269,6 +270,7 @@ SECTION: Section = Section(
             "checks",
             "Checks",
             (
+                shooting,
                 stability,
                 bifurcations,
                 amplitudes_in_time,

@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.records.columns import ExaminedRows, MotionsInTime, TimeChecks, read
+from stickslip.analyses.forced_response.records.columns import ExaminedRows, MotionsInTime, Shots, TimeChecks, read
 from stickslip.analyses.forced_response.stability.stable_words import FEW, all_lines
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
@@ -47,6 +47,34 @@ def stability(response: Response) -> list[Table | Words]:
         every = response.table("", (), head, rows, folded=f"All {len(rows)} points")
         return [Words((text,), "Stability", lines), every]
     return [response.table("Stability", (text,), head, rows, items=lines)]
+
+
+def shooting(response: Response) -> Table | None:
+    """Return a table with one row a case solved by shooting: how exactly its motions repeat, and what the time step makes wrong."""
+    known = [(c, read(Shots, response.data, c.index)) for c in response.cases]
+    known = [(c, own) for c, own in known if own.shot_steps.size]
+    if not known:
+        return None
+    rows = [
+        [
+            case.short,
+            fixed(own.shot_steps.size, 0),
+            fixed(own.shot_steps[0], 0),
+            _largest(own.shot_residual),
+            _largest(own.shot_step_error_percent),
+            fixed(own.shot_periods.sum(), 0),
+            fixed(own.shot_corrections.sum(), 0),
+        ]
+        for case, own in known
+    ]
+    text = "Each motion is a state that repeats after a period. The residual is the distance of the state after a period from that before, relative to the vibration. The error of the time step is estimated with twice as many steps, four times where a contact opens; above the threshold a point is doubtful."
+    head = ["motions", "steps a period", "largest residual", "largest error of the step (%)", "periods", "corrections"]
+    return response.table("Shooting", (text,), head, rows)
+
+
+def _largest(values: FloatArray) -> str:
+    known = values[~np.isnan(values)]
+    return number(float(known.max()), 2) if known.size else NONE
 
 
 def _decided(own: ExaminedRows) -> str:

@@ -201,7 +201,9 @@ def _caption(response: Response) -> str:
     over = " divided by the amplitude of the excitation" if response.per_force else ""
     name = amplitude_name(response.data)
     text = f"{name[0].upper()}{name[1:]} of {response.output_name}{over}. {_peaks(response)}"
-    if not response.decides:
+    if response.steps:
+        text += f"Each motion was found in time by shooting, {response.steps} steps a period."
+    elif not response.decides:
         text += f"All points keep the same harmonics (`{response.selection}`)."
     else:
         n = counted(int(converged.sum()), "accepted point")
@@ -390,7 +392,7 @@ def low_order(response: Response) -> Plot | None:
     """Draw low-order against accepted curves for the cases with the largest difference (Gastaldi and Berruti 2017, fig. 4a)."""
     low, accepted, scale = response.response(response.fields.amplitude_low), response.accepted, response.scale
     cases = most(response, np.abs(low / accepted - 1))
-    if not cases:
+    if not cases or response.steps:
         return None
     figure = go.Figure()
     for case in cases:

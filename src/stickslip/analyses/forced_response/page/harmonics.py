@@ -149,6 +149,9 @@ def _why(response: Response, case: ShownCase) -> str:
 
 def choice(response: Response) -> list[Table | Words]:
     """Return words and a table: frequencies that needed more harmonics, the strategy, and the reasons."""
+    if response.steps:
+        said = f"Each motion was found in time by shooting, {response.steps} steps a period. Its harmonics up to {response.high_harmonics[-1]} are stored; none was solved for."
+        return [Words((said,))]
     if not response.decides:
         kept = _kept_where(response)
         return [Words((f"The same harmonics everywhere (`{response.selection}`): {kept}.",))]

@@ -19,6 +19,7 @@ from stickslip.analyses.forced_response.records.columns import (
     PointFields,
     Points,
     PointStability,
+    Shots,
     Verdicts,
     each,
     read,
@@ -95,6 +96,12 @@ class Response(Node):
     def verdicts(self) -> Verdicts:
         """Verdicts on cases and points; empty and None for results without."""
         return read(Verdicts, self.data)
+
+    @property
+    def steps(self) -> int:
+        """Time steps in a period where every case was solved by shooting; else 0."""
+        own = read(Shots, self.data).shot_steps
+        return int(own[0]) if own.size and own.size == self.hz.size else 0
 
     @property
     def point_case(self) -> IntArray:

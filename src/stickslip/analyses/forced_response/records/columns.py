@@ -148,6 +148,25 @@ class PointFields:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Shots:
+    """Motions found by shooting (``method = "shooting"``), one row a point of its case."""
+
+    shot_case: IntArray | None = column("1", "case of a motion found by shooting", along="shot", default=None)
+    shot_frequency_hz: FloatArray = column("Hz", "its frequency", along="shot")
+    shot_residual: FloatArray = column(
+        "1", "distance of the state after a period from that before, relative to the vibration", along="shot"
+    )
+    shot_step_error_percent: FloatArray = column(
+        "percent",
+        "estimated error of the harmonics by the time step, of the largest: by twice as many steps, four times where a contact opens; NaN where no motion was found",
+        along="shot",
+    )
+    shot_steps: IntArray = column("1", "time steps in a period", along="shot")
+    shot_periods: IntArray = column("1", "periods integrated", along="shot")
+    shot_corrections: IntArray = column("1", "of these with tangents: corrections by Newton's method", along="shot")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PeakPeriod:
     """The contacts over a period at the peak."""
 
@@ -602,6 +621,7 @@ KINDS = (
     CaseNumbers,
     Points,
     PointFields,
+    Shots,
     PeakPeriod,
     Attempts,
     ModelFacts,

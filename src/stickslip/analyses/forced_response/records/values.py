@@ -21,6 +21,7 @@ from stickslip.analyses.forced_response.records.columns import (
     PointFields,
     Points,
     PointStability,
+    Shots,
     TimeChecks,
     stored,
 )
@@ -104,6 +105,24 @@ def of_response(question: Question, response: Response, shift: tuple[float, floa
         | _of_peak(question, response)
         | _of_drawn(question, response)
         | _of_attempts(question, response)
+    )
+
+
+def of_shots(response: Response) -> Values:
+    """Return the variables of a response by shooting, one row a point; none of a response by balance."""
+    points = [a.point for a in response.accepted if a.point.shot]
+    if not points:
+        return {}
+    shots = [p.shot[0] for p in points]
+    return stored(
+        Shots(
+            shot_frequency_hz=np.array([p.omega / HZ for p in points]),
+            shot_residual=np.array([s.residual for s in shots]),
+            shot_step_error_percent=100 * np.array([s.step_error for s in shots]),
+            shot_steps=_whole(s.steps for s in shots),
+            shot_periods=_whole(s.periods for s in shots),
+            shot_corrections=_whole(p.iterations for p in points),
+        )
     )
 
 

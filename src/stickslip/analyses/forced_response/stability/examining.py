@@ -40,6 +40,9 @@ def examined_points(question: Question, response: Response, examine: Examine) ->
     """
     if question.examine == "off" or response.top is None:
         return []
+    if question.stepping is not None:  # multipliers of every motion are known
+        chosen = [response.peak] if question.examine == "peak" else range(len(response.accepted))
+        return [replace(examine(response.accepted[i]), position=i) for i in chosen if response.accepted[i].fields]
     if why_not(question):
         return [replace(examine(response.top), position=response.peak)]
     course = _course(question, response)

@@ -21,7 +21,7 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import Stability, hill_stability, settled_stability
-from stickslip.response.stability.found import modulus_text
+from stickslip.response.stability.found import UNIT_TOLERANCE, Floquet, modulus_text
 from stickslip.response.stability.hill_method.hill_segment import Keep, not_kept
 from stickslip.response.stability.missing_harmonics import with_more
 from stickslip.response.stability.waves import WaveDisturbance, growing_wave, point_disturbances
@@ -106,6 +106,8 @@ class Examined:
 
 def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Examined:
     """Return the stability of a point by its multipliers, or why there are none; `keep` stores pieces of a long examination."""
+    if accepted.point.shot:
+        return _of_shot(accepted.point)
     omega = accepted.point.omega
     why, hill = why_not(question), by_hill(question.model.system)
     if why:
@@ -123,6 +125,27 @@ def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Ex
         return Examined(omega, "not examined", np.nan, np.nan, why, basis="not examined")
     seen = _seen(question, accepted, found, f"{found.reason}{wave}")
     return seen if settled.motion is None else _of_motion(question, seen, settled.motion)
+
+
+def _of_shot(point: ForcedPoint) -> Examined:
+    """Return the stability of a motion found by shooting: by its multipliers, with their error by the time step."""
+    (shot,) = point.shot
+    floquet = Floquet(shot.multipliers)
+    neutral = np.abs(floquet.multipliers - 1.0) <= UNIT_TOLERANCE
+    found = Stability(floquet, np.where(neutral, 0.0, shot.growth_error), floquet.neutral, 0, 0)
+    reason = found.reason
+    if np.isinf(shot.growth_error):
+        reason = f"the largest multiplier has the modulus {found.multiplier:.4g} with {shot.steps} steps a period; its error is not known, as contacts change their state within a step"
+    more = f"forced_response.steps_per_period above {shot.steps} makes the error smaller"
+    return Examined(
+        point.omega,
+        found.verdict,
+        found.multiplier,
+        found.multiplier_error,
+        reason,
+        large=more,
+        multipliers=floquet.multipliers,
+    )
 
 
 def _of_motion(question: Question, seen: Examined, motion: ForcedPoint) -> Examined:

@@ -116,6 +116,8 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
     """
     found = examined_points(question, response, look)
     look.tell()
+    if question.stepping is not None:
+        return found
     for _ in range(MOST_PEAKS):
         peak = with_stable_peak(response, found)
         if not to_integrate(question, peak, found) or peak.top is None:

@@ -21,6 +21,7 @@ from stickslip.analyses.forced_response.records.columns import (
     PointFields,
     Points,
     PointStability,
+    Shots,
     TimeChecks,
     each,
     read,
@@ -209,6 +210,12 @@ class Curve:
         """(n,) indices of the case's points along ``point``."""
         owner = read(Points, self.data).point_case
         return np.zeros(0, dtype=np.int64) if owner is None else np.flatnonzero(owner == self.case)
+
+    @property
+    def steps(self) -> int:
+        """Time steps in a period of a case solved by shooting; 0 for one by balance."""
+        own = self.read(Shots).shot_steps
+        return int(own[0]) if own.size else 0
 
     @property
     def hz(self) -> FloatArray:

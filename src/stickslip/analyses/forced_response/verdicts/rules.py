@@ -101,6 +101,8 @@ def stability(case: Curve) -> Iterator[Finding]:
             told = [why, *map(str, case.read(MotionsInTime).not_periodic_sentence)]
             known = next(filter(None, map(fewer, told)), "")
             remedy = known or f"{in_time_there(case, point)}, and sees whether the motion stays."
+            if case.steps:
+                remedy = f"Give forced_response.steps_per_period = {2 * case.steps}."
             yield Finding("doubtful", why, remedy, (point,))
 
 
@@ -293,6 +295,9 @@ def unsolved(case: Curve) -> Iterator[Finding]:
 
 def few_harmonics(case: Curve) -> Iterator[Finding]:
     """Doubt a solution with too large a predicted error, and one that nothing has judged."""
+    if case.steps:
+        yield from _coarse(case)
+        return
     for i in np.flatnonzero(case.converged):
         own, solved = case.own_error[i], case.audit[i]
         if case.attained[i] or not np.isnan(solved):
@@ -304,6 +309,15 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
         elif np.isnan([own, case.reference[i], case.integrated[i]]).all():
             why = f"the error of H = {case.kept[i]} is not known, as its harmonics were not examined"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
+
+
+def _coarse(case: Curve) -> Iterator[Finding]:
+    """Doubt motions found by shooting that shorter time steps are expected to change."""
+    for i in np.flatnonzero(case.converged & (case.own_error > case.limit)):
+        own = float(case.own_error[i])
+        why = f"shorter time steps than {case.steps} a period are expected to change it by {error_text(own)}"
+        remedy = f"Give forced_response.steps_per_period = {2 * case.steps}, and compare."
+        yield Finding("doubtful", why, remedy, (int(i),), own, error_text(own))
 
 
 def _more(case: Curve, point: int) -> str:
