@@ -168,6 +168,18 @@ def test_cases_are_paired_by_what_is_varied_whatever_their_names_are() -> None:
     assert set(found["case"]) == {f"{KEY} = 50", f"{KEY} = 5"}
 
 
+def test_unstable_points_have_a_mark_of_their_own() -> None:
+    own = design((50, 10), 1.0, 0.4)
+    data = own.data["forced_response"].to_dataset()
+    levels = np.zeros(data.sizes["point"], dtype=np.int64)
+    at = np.flatnonzero(data["point_case"].values == 1)[:3]
+    levels[at] = 1, 2, 3
+    judged = ss.Result(tree_of(forced_response=data.assign(verdict=("point", levels))))
+    every = ss.compare(judged, own, names=("a", "b")).plot("compared_responses").data
+    drawn = {symbol for trace in every if trace.name == "a" for symbol in trace.marker.symbol}
+    assert drawn == {"circle", "circle-open", "x", "circle-open-dot"}
+
+
 def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> None:
     one = design((50,), 1.0, 0.6)
     figure = ss.compare(one, one, names=("a", "b")).plot("compared_responses")

@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_result import synthetic_result
+from synthetic_result import synthetic_result, tree_of
 
+import stickslip as ss
 from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.many_cases import FEW, MOST_IN_PANELS, extremes, panels
@@ -140,6 +141,16 @@ def test_cases_without_common_values_stand_on_parallel_axes() -> None:
     (lines,) = plot.figure.data
     assert [axis.label for axis in lines.dimensions] == ["force (N)", "mass (kg)", "peak (µm/N)", "at (Hz)"]
     assert np.allclose(lines.dimensions[3].values, [response.peak_hz(c) for c in response.cases])
+
+
+def test_designs_of_many_curves_are_compared_by_a_map_of_differences() -> None:
+    first, second = grid(3, 10), grid(3, 10)
+    factor = np.linspace(0.9, 1.2, 30)[first["point_case"].values]
+    second["amplitude"] = second["amplitude"] * xr.DataArray(factor, dims="point")
+    found = ss.compare(*(ss.Result(tree_of(forced_response=d)) for d in (first, second)), names=("a", "b"))
+    (cells,) = found.plot("compared_optimisation").data
+    off = np.array([[cells.z[m][f] for m in range(10)] for f in range(3)]).ravel()  # in the order of the study
+    np.testing.assert_allclose(off, 100 * (np.linspace(0.9, 1.2, 30) - 1), atol=1e-9)
 
 
 def test_the_answer_says_where_friction_does_nothing_and_where_no_case_differs() -> None:

@@ -10,13 +10,14 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
 from stickslip.analyses.forced_response.page.curves import DASHES
+from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import Chapter, Placing, page_html
-from stickslip.report.plot import INK, MUTED, Plot, log_ticks, styled
+from stickslip.report.plot import COLOURS, INK, MUTED, Plot, log_ticks, styled
 from stickslip.report.quantities import (
     NONE,
     Scale,
@@ -30,11 +31,12 @@ from stickslip.report.quantities import (
     scale_for,
 )
 from stickslip.report.section import Card, Content
-from stickslip.study.verdict import conclusion
+from stickslip.study.verdict import POINT_LEVELS, UNSTABLE, conclusion
 
 _BEST = "best of each"
 _DASHES = ("dash", "dot", "dashdot", "longdash")
 _MOST_INPUTS = 400  # characters of a value that a cell shows
+_SYMBOLS = {"trusted": "circle", "doubtful": "circle-open", "wrong": "x", UNSTABLE: "circle-open-dot"}
 
 
 def amplitudes(design: Response, *, divided: bool) -> FloatArray:
@@ -124,7 +126,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
     over = " / force" if divided else ""
     figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))
     figure.update_xaxes(title_text="frequency (Hz)")
-    caption = f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones."
+    caption = f"Amplitude of {_outputs(told)}. Open symbols are doubtful points, crosses wrong ones, open symbols with a dot unstable ones."
     captions = {c.index: _shown(told, c, divided=divided) for c in offered}
     first = opening(designs, offered, divided=divided)
     chosen = first.index if first else -1
@@ -150,7 +152,7 @@ def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> st
 
 def _line(design: Design, response: Response, case: ShownCase, y: FloatArray, scale: Scale) -> go.Scatter:
     at = response.points(case)
-    symbols = np.array(["circle", "circle-open", "x"])[response.levels[at]]
+    symbols = np.array([_SYMBOLS[level] for level in POINT_LEVELS])[response.levels[at]]
     return go.Scatter(
         x=response.hz[at],
         y=y[at],
@@ -170,6 +172,8 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     told = [(d, r) for d, r, own in numbered if own == key and len(r.peaked) > 1]
     if not key or len(told) < 2:
         return None
+    if max(len(families_of(r.data, key, r.peaked)) for _, r in told) > FEW:
+        return _differences_of_peaks(told, key, divided=divided)
     figure, heights = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38]), []
     curves = []
     for design, response in told:
@@ -209,6 +213,46 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     lowest = min(((float(np.nanmin(p)), n, v[int(np.nanargmin(p))]) for n, _, v, p, _ in curves), key=lambda t: t[0])
     caption = f"Peak and its frequency over {axis_name(told[0][1].data, key)}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
+
+
+def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, divided: bool) -> Plot | None:
+    """Draw by how much the peaks of each later design are larger than those of the first one, one panel a design."""
+    rows = [row for row in peak_rows([d for d, _ in told], divided=divided) if np.isfinite(row.off_percent)]
+    families = {
+        c.label: (name, c.value) for _, r in told for name, f in families_of(r.data, key, r.peaked).items() for c in f
+    }
+    later = [d.name for d, _ in told[1:] if any(row.design == d.name for row in rows)]
+    if not later:
+        return None
+    names = list(dict.fromkeys(families[row.case][0] for row in rows))
+    values = sorted({families[row.case][1] for row in rows})
+    figure = make_subplots(1, len(later), shared_yaxes=True, subplot_titles=later, horizontal_spacing=0.03)
+    most = max(abs(row.off_percent) for row in rows) or 1.0
+    for k, design in enumerate(later, 1):
+        off = np.full((len(names), len(values)), np.nan)
+        for row in rows:
+            if row.design == design:
+                off[names.index(families[row.case][0]), values.index(families[row.case][1])] = row.off_percent
+        cells = go.Heatmap(
+            x=[number(v, 4) for v in values],
+            y=names,
+            z=off,
+            text=[[number(v, 2) if np.isfinite(v) else "" for v in line] for line in off],
+            texttemplate="%{text}",
+            zmin=-most,
+            zmax=most,
+            colorscale=[[0.0, COLOURS[2]], [0.5, "#ffffff"], [1.0, COLOURS[1]]],
+            colorbar={"title": {"text": "%"}, "thickness": 14},
+            showscale=k == len(later),
+            hovertemplate=f"%{{y}}, %{{x}}<br>%{{z:.3g}} %<extra>{design}</extra>",
+        )
+        figure.add_trace(cells, 1, k)
+    styled(figure, 170 + 26 * len(names))
+    figure.update_xaxes(type="category", title_text=axis_name(told[0][1].data, key))
+    figure.update_yaxes(type="category", autorange="reversed")
+    worst, best = (pick(rows, key=lambda row: row.off_percent) for pick in (max, min))
+    text = f"Peak of each case over the one of {told[0][0].name}, in percent. Largest: {number(worst.off_percent)} % ({worst.design}, {worst.case}); smallest: {number(best.off_percent)} % ({best.design}, {best.case})."
+    return Plot("compared_optimisation", "Peaks against the first design", text, figure)
 
 
 def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:

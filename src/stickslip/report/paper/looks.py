@@ -71,8 +71,8 @@ def dash(style: str | None) -> Any:
 def symbol(name: str | None) -> tuple[str, bool]:
     """Return the marker of matplotlib for one of plotly, and whether it is open."""
     given = name or "circle"
-    own = given.removesuffix("-open")
-    return _MARKERS.get(own, "o"), given.endswith("-open") and not own.endswith("-thin")
+    own = given.removesuffix("-dot").removesuffix("-open")
+    return _MARKERS.get(own, "o"), "-open" in given and not own.endswith("-thin")
 
 
 def colour_map(scale: Sequence[Sequence[Any]] | None) -> Any:

@@ -84,7 +84,7 @@ def _above(response: Response) -> str:
     above = response.converged & (response.of_points.own_error_percent > response.threshold)
     if not above.any():
         return "None lies above it. "
-    solved, doubtful = above & np.isfinite(audit), above & (response.levels > 0)
+    solved, doubtful = above & np.isfinite(audit), above & np.isin(response.levels, (1, 2))
     told = f"Above it: {counted(int(above.sum()), 'point')}"
     if solved.any():
         most = response.shown(float(audit[solved].max()))
