@@ -257,7 +257,7 @@ def _view(scene: Any) -> dict[str, object]:
 def _laid_out(figure: go.Figure, points: FloatArray, *, flat: bool) -> None:
     """Give the figure its axes and legend; masses in a row are seen from the side."""
     styled(figure, 360 if flat else 560)
-    scene = _scene_of(points, 2.0 if flat else 1.5, 0.1)
+    scene = _scene_of(points, 2.0 if flat else 1.35, 0.1)
     eye = {"x": 0.15, "y": -2.0, "z": 0.35} if flat else {"x": 1.1, "y": -1.5, "z": 0.5}
     scene["camera"] = {"eye": eye, "projection": {"type": "orthographic"}}
     if flat:
