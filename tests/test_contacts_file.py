@@ -1,9 +1,11 @@
 """Contacts of a study file: every law runs from one, and what presses or opens a contact at rest."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
 import pytest
+from small_v2 import write_shrouded_deck
 
 import stickslip as ss
 from stickslip.assembly.assembling import assemble
@@ -175,3 +177,33 @@ def test_a_contact_where_everything_is_clamped_says_so(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"contact.foot.between: every node of 'bars.foot' is clamped"):
         check_study(read_study(path))
+
+
+def test_shrouds_named_the_wrong_way_round_are_told_so(tmp_path: Path) -> None:
+    swapped = {"contact.shroud.between": '["blade.shroud_low", "next.blade.shroud_high"]'}
+    study = read_study(write_shrouded_deck(tmp_path, swapped))
+    with pytest.raises(InputError) as caught:
+        check_study(study)
+    said = str(caught.value)
+    right = '["blade.SHROUD_HIGH", "next.blade.SHROUD_LOW"]'  # as the file of the model has them
+    assert said.endswith(f"With blade.SHROUD_LOW and blade.SHROUD_HIGH exchanged they match: between = {right}.")
+    # faces that match neither way keep their own advice
+    same = {"contact.shroud.between": '["blade.shroud_low", "next.blade.shroud_low"]'}
+    with pytest.raises(InputError) as caught:
+        check_study(read_study(write_shrouded_deck(tmp_path / "same", same)))
+    assert "exchanged" not in str(caught.value)
+
+
+def test_a_wave_that_the_wheel_of_a_file_lacks_is_refused_before_anything_is_reduced(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    changes = {"modes.nodal_diameters": "[0, 5]", "vary.load.gas.force_n": "[1.0, 2.0]"}
+    path = write_shrouded_deck(tmp_path, changes)
+    with caplog.at_level(logging.INFO, "stickslip"), pytest.raises(InputError) as caught:
+        check_study(read_study(path))
+    assert (
+        str(caught.value)
+        == f"{path} (force 1 N): modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4."
+    )
+    assert "reducing" not in caplog.text
+    assert "pairing" not in caplog.text

@@ -70,6 +70,12 @@ class InputError(StickslipError):
         others = tuple(other.inside(place) for other in self.others)
         return InputError(f"{place}: {self.place}", self.problem, self.advice, self.words, others)
 
+    def under(self, old: str, new: str) -> "InputError":
+        """Return the same errors, each place prefixed by `new`, which replaces `old` where it begins with that."""
+        others = tuple(other.under(old, new) for other in self.others)
+        place = f"{new}: {self.place.removeprefix(f'{old}: ')}"
+        return InputError(place, self.problem, self.advice, self.words, others)
+
     def called(self, words: Mapping[str, str]) -> "InputError":
         """Return the same errors with the arguments under other names."""
         others = tuple(other.called(words) for other in self.others)

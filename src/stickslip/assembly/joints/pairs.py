@@ -238,7 +238,15 @@ def refuse_itself(place: str, first: Spot, second: Spot) -> None:
 
 
 def _paired(
-    places: Places, key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
+    places: Places,
+    key: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    second: Spot | None,
+    turn: Turn | None,
+    *,
+    hints: bool = True,
 ) -> tuple[Pairing, tuple[str, ...]]:
     """Pair two surfaces, and return warnings; with a rotation the dofs of the next sector follow those of this one."""
     assert first.surface is not None
@@ -262,10 +270,34 @@ def _paired(
         found = named(key, contact, lambda: match(contact, facing, b, along), (facing, b))
     except InputError as error:
         told = with_pairing(error, contact, facing, b)
-        raise (told if turn is not None else with_hint(told, places, facing, second)) from None
+        if turn is None:
+            raise with_hint(told, places, facing, second) from None
+        raise (_exchanged(told, places, key, contact, law, first, second, turn) if hints else told) from None
     rigid = places.parts[first.part].body is not None and len(b.facets)
     tilted = tilt_warning(key, contact, first.part, mine, opposite) if rigid else ()
     return found, (*tilted, *overlap_warning(key, contact, found, (facing, b)))
+
+
+def _exchanged(
+    error: InputError,
+    places: Places,
+    key: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    second: Spot,
+    turn: Turn,
+) -> InputError:
+    """Return an error about surfaces of neighbouring sectors; where they match with the surfaces exchanged, it says so."""
+    one, two = contact.between
+    other = two.removeprefix(NEXT), f"{NEXT}{one}"
+    exchanged = replace(contact, between=other)
+    try:
+        _paired(places, key, exchanged, law, second, first, turn, hints=False)
+    except InputError:
+        return error
+    remedy = f'With {one} and {other[0]} exchanged they match: between = ["{other[0]}", "{other[1]}"].'
+    return input_error(error.place, error.problem, remedy)
 
 
 def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:

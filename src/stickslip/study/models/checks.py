@@ -404,7 +404,7 @@ def _told(table: Any, side: str) -> dict[str, Any]:
 
 def diameter_refusals(tables: Tables, sectors: int | None) -> Iterator[InputError]:
     """Yield errors about nodal diameters that a wheel with this number of sectors lacks; None: only a file holds the number."""
-    for name in ("modes", "campbell"):
+    for name in ("modes", "campbell", "flutter"):
         yield from _diameters(name, getattr(tables, name, None), sectors)
 
 

@@ -15,6 +15,7 @@ from stickslip.model.part import Part
 from stickslip.study.file.model.loads import LoadTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.aero import aerodynamics_of
+from stickslip.study.models.checks import diameter_refusals, staged
 from stickslip.study.models.files import alike
 from stickslip.study.models.mistuning import mistuning_of
 from stickslip.study.models.parts import Memo, Workshop
@@ -48,6 +49,9 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     parts = {name: part for name, part in every.items() if name not in spare}
     rotation = tables.rotation
     _require_speed(tables, parts)
+    if not staged(tables):
+        for error in diameter_refusals(tables, max((part.sectors for part in parts.values()), default=1)):
+            raise error
     alike = Model(
         parts=parts,
         contacts={name: _contact(parts, table) for name, table in tables.contact.items()},
