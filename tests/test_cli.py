@@ -341,6 +341,7 @@ def test_a_sector_answers_analysis_by_analysis_on_one_page(tmp_path: Path) -> No
     said = done("run", str(path), "--only", "modes")
     assert "Natural frequencies in Hz" in said
     assert "Crossings" not in said
+    assert "answers: 1\n" in said
     assert "Crossings" in done("run", str(path), "--only", "campbell", "--only", "safe")
     with xr.open_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf") as tree:
         assert set(tree.children) == {"modes", "campbell", "safe"}

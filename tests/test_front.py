@@ -3,6 +3,7 @@
 import io
 import logging
 from pathlib import Path
+from time import monotonic, sleep
 
 import numpy as np
 import plotly.graph_objects as go
@@ -20,9 +21,10 @@ from stickslip.api.result import Result
 from stickslip.api.screen import LOG, Screen, by_default, on_screen
 from stickslip.api.study import Study
 from stickslip.errors import InputError
+from stickslip.model.slow_steps import step
 from stickslip.study.coordinates import with_coordinates
 from stickslip.study.file.keys import REQUIRED, table_keys
-from stickslip.study.store.progress import advance, at_work, sum_up
+from stickslip.study.store.progress import advance, at_work, stage, sum_up
 
 ROOT = Path(__file__).parents[1]
 
@@ -212,6 +214,46 @@ def test_a_job_leaves_one_line_and_points_are_said_where_they_are_asked_for() ->
         lines = stream.getvalue().splitlines()
         assert len(lines) == count, lines
         assert lines[-1] == "response: a = 1: peak 2 mm (0 s)"
+
+
+def test_a_silent_run_says_where_it_is_without_a_terminal() -> None:
+    stream = io.StringIO()
+    screen = Screen(Console(file=stream, width=200), quiet=0.05)
+
+    def next_line() -> str:
+        count, end = len(stream.getvalue().splitlines()), monotonic() + 10.0
+        while len(stream.getvalue().splitlines()) == count and monotonic() < end:
+            sleep(0.01)
+        return stream.getvalue().splitlines()[-1]
+
+    with on_screen(screen):
+        with step("reducing part blade: 17082 dofs"):
+            assert next_line() == "  reducing part blade: 17082 dofs, 0 s"
+        with at_work("response: a = 1"):
+            advance(0.5, "more harmonics, point 3: 169.62 Hz")
+            assert next_line() == "  response: a = 1 50 %: more harmonics, point 3: 169.62 Hz, 0 s"
+            stage("stability, point 2: 170.00 Hz")
+            assert next_line() == "  response: a = 1 50 %: stability, point 2: 170.00 Hz, 0 s"
+            advance(0.2, "audit")  # what is repeated does not lead back
+            assert "a = 1 50 %: audit" in next_line()
+        assert next_line().startswith("response: a = 1: done")
+        told = stream.getvalue()
+        sleep(0.2)
+        assert stream.getvalue() == told  # nothing is at work
+
+
+def test_bars_say_the_stage() -> None:
+    stream = io.StringIO()
+    console = Console(file=stream, width=120, force_terminal=True)
+    with on_screen(Screen(console, bars=2)):
+        with step("building the parts"):
+            sleep(0.3)
+        assert "building the parts" in stream.getvalue()
+        with at_work("response: a = 1"):
+            stage("check in time: [170.00 Hz]")
+            sleep(0.3)
+    assert "check in time: [170.00 Hz]" in stream.getvalue()
+    assert "response: a = 1: done" in stream.getvalue()
 
 
 def test_keys_of_a_table_are_told_with_defaults_and_meanings() -> None:

@@ -22,7 +22,7 @@ from stickslip.study.run import answer, run_study
 from stickslip.study.shard import Shard
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.netcdf import read_tree
-from stickslip.study.store.progress import LOG, Interrupted
+from stickslip.study.store.progress import DONE, LOG, Interrupted
 from stickslip.study.store.worker_process import Limits
 from stickslip.study.store.workers import executor
 from stickslip.study.verdict import Verdict, conclusion, of_tree
@@ -112,6 +112,24 @@ def test_workers_give_the_same_bits_and_their_lines_come_back(
     assert sorted(r.job for r in told) == ["toy: factor = 1.5", "toy: factor = 2.5"]
     assert all(r.fraction == 1.0 for r in told)
     assert (other.folder / "run.log").read_text().count("checked twice") == 2
+
+
+def test_a_job_of_all_cases_is_named_without_a_case_and_answers_are_those_asked_for(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for factors, label in (((1.5, 1.5), "toy"), ((1.5, 2.5, 1.5), "toy: a, c"), ((1.5,), "toy: a")):
+        names = iter("abc")
+        alike = study(tmp_path / str(len(factors)), factors=factors)
+        cases = [replace(case, label=next(names)) for case in alike.cases()]
+        monkeypatch.setattr(ToyStudy, "cases", lambda _, cases=cases: cases)
+        with caplog.at_level(logging.INFO, "stickslip"):
+            run_study(alike)
+        told = [r.job for r in caplog.records if r.getMessage() == DONE]
+        assert label in told
+        assert f"answers: {len(factors)}" in caplog.text
+        monkeypatch.undo()
+        monkeypatch.setitem(ANALYSES, "toy", Home("toy_analysis:TOY"))
+        caplog.clear()
 
 
 def test_model_of_python_gets_the_same_answer(tmp_path: Path, whole: ToyStudy) -> None:

@@ -2,9 +2,11 @@
 
 import logging
 import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from html import escape
 from time import monotonic
 from typing import Any
@@ -17,7 +19,7 @@ from stickslip.study.store.progress import DONE, head
 
 LOG = logging.getLogger("stickslip")
 STEPS = 10  # plain lines that a job writes on its way
-BETWEEN = 60.0  # seconds between plain lines of a job, where points are not asked for
+QUIET = 30.0  # seconds without a line, after which running jobs say where they are
 FULL = "━" * 10  # the bar of a job that is done
 _BETWEEN = 0.2  # seconds between two drawings
 _WIDTH = 24  # characters of a bar
@@ -54,11 +56,17 @@ class NotebookScreen(logging.Handler):
         """Show a record."""
         text, fraction = record.getMessage(), getattr(record, "fraction", None)
         if fraction is not None:
-            self._jobs[str(getattr(record, "job", "")) or "model"] = float(fraction), text
+            self._state(record, float(fraction), text)
+        elif hasattr(record, "fraction"):
+            self._state(record, 0.0, text)
         elif head(record):
             self._told.append(f"{head(record)}{text}")
         if time.monotonic() - self._drawn > _BETWEEN:
             self._draw()
+
+    def _state(self, record: logging.LogRecord, fraction: float, text: str) -> None:
+        job = str(getattr(record, "job", "")) or "model"
+        self._jobs[job] = max(fraction, self._jobs.get(job, (0.0, ""))[0]), text
 
     def _draw(self) -> None:
         if self._jobs or self._told:
@@ -87,8 +95,32 @@ class NotebookScreen(logging.Handler):
         return f"<pre>{escape(self._text())}</pre>"
 
 
+@dataclass
+class At:
+    """Where a job is.
+
+    Parameters
+    ----------
+    begun
+        Time of its first record.
+    fraction
+        Finished share.
+    text
+        Stage and point, in words.
+    task
+        Its bar; None without a terminal.
+    """
+
+    begun: float
+    fraction: float = 0.0
+    text: str = ""
+    task: TaskID | None = None
+
+
 class Screen(logging.Handler):
     """Draws a bar for each running job and one line for each finished job; prints lines that belong to no job.
+
+    Without a terminal it prints where each running job is when it has written nothing for `QUIET` seconds.
 
     Parameters
     ----------
@@ -100,30 +132,46 @@ class Screen(logging.Handler):
         Whether to print warnings and verdicts; false if they are listed at the end.
     verbose
         Whether to print the messages of running jobs too, as the log file does.
+    quiet
+        Seconds without a line, after which running jobs say where they are.
     """
 
-    def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False) -> None:
+    def __init__(
+        self,
+        console: Console,
+        bars: int = 1,
+        *,
+        warnings: bool = True,
+        verbose: bool = False,
+        quiet: float = QUIET,
+    ) -> None:
         super().__init__()
-        self._console, self._bars = console, bars
+        self._console, self._bars, self._quiet = console, bars, quiet
         self._warnings, self._verbose = warnings, verbose
         self._progress: Progress | None = None
-        self._tasks: dict[str, TaskID] = {}
+        self._at: dict[str, At] = {}
         self._steps: dict[str, int] = {}
-        self._begun: dict[str, float] = {}
-        self._told: dict[str, float] = {}
         self._sums: dict[str, str] = {}
+        self._wrote = self._begun = monotonic()
 
     @contextmanager
     def shown(self) -> Iterator[None]:
         """Draw while the block runs."""
         if not self._console.is_terminal:
-            yield
+            over = threading.Event()
+            thread = threading.Thread(target=self._watch, args=(over,), daemon=True)
+            thread.start()
+            try:
+                yield
+            finally:
+                over.set()
+                thread.join()
             return
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
             TimeElapsedColumn(),
-            TextColumn("{task.fields[state]}"),
+            TextColumn("{task.fields[state]}", markup=False),
         )
         with Progress(*columns, console=self._console, transient=True) as self._progress:
             yield
@@ -132,11 +180,8 @@ class Screen(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record."""
         text, job = record.getMessage(), str(getattr(record, "job", ""))
-        fraction = getattr(record, "fraction", None)
-        if job and job not in self._begun:
-            self._begun[job] = self._told[job] = monotonic()
-        if fraction is not None:
-            self._advance(job, float(fraction), text)
+        if hasattr(record, "fraction"):
+            self._advance(job, record.fraction, text)
             return
         if hasattr(record, "sums_up"):
             self._sums[job] = str(record.sums_up)
@@ -146,29 +191,49 @@ class Screen(logging.Handler):
         elif self._verbose or not job:
             self._line(text)
 
+    def _watch(self, over: threading.Event) -> None:
+        """Say where the running jobs are whenever nothing has been written for a while."""
+        while not over.wait(max(self._wrote + self._quiet - monotonic(), 0.01)):
+            with self.lock or nullcontext(), suppress(OSError):  # a closed pipe, of which the next line tells
+                if monotonic() - self._wrote >= self._quiet:
+                    self._wrote = monotonic()
+                    for job, at in self._at.items():
+                        self._line(f"  {_where(job, at)}, {lasting(monotonic() - at.begun)}")
+
     def _line(self, text: str) -> None:
+        self._wrote = monotonic()
         self._console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
 
-    def _advance(self, job: str, fraction: float, text: str) -> None:
+    def _advance(self, job: str, fraction: float | None, text: str) -> None:
         if text == DONE:
             self._done(job)
-        elif self._progress is None:
-            self._plain(job, fraction, text)
-        else:
-            if job not in self._tasks:
-                while len(self._tasks) >= self._bars:  # of workers that were lost
-                    self._progress.remove_task(self._tasks.pop(next(iter(self._tasks))))
-                self._tasks[job] = self._progress.add_task(job or "model", total=1.0, state="")
-            state = "" if text == job or not self._verbose else text
-            self._progress.update(self._tasks[job], completed=fraction, state=state)
-
-    def _plain(self, job: str, fraction: float, text: str) -> None:
-        """Print some of the states of a job, without `verbose` at most one a minute."""
-        if not self._verbose:
-            if monotonic() - self._told.get(job, monotonic()) > BETWEEN:
-                self._told[job] = monotonic()
-                self._line(f"  {job} {100 * fraction:.0f} %")
             return
+        if job and job not in self._at:  # the model is built
+            self._forget("")
+        at = self._at.setdefault(job, At(monotonic() if job else self._begun))
+        at.fraction, at.text = max(at.fraction, fraction or 0.0), "" if text == job else text
+        if self._progress is not None:
+            self._draw(job, at)
+        elif self._verbose and fraction is not None:
+            self._step(job, at.fraction, text)
+
+    def _draw(self, job: str, at: At) -> None:
+        """Move the bar of a job."""
+        assert self._progress is not None
+        if at.task is None:
+            while sum(one.task is not None for one in self._at.values()) >= self._bars:  # of workers that were lost
+                self._forget(next(name for name, one in self._at.items() if one.task is not None))
+            # without a job there is no share: the bar runs to and fro
+            at.task = self._progress.add_task(job or "model", total=1.0 if job else None, state="")
+        self._progress.update(at.task, completed=at.fraction, state=printable(at.text))
+
+    def _forget(self, job: str) -> None:
+        at = self._at.pop(job, None)
+        if at is not None and at.task is not None and self._progress is not None:
+            self._progress.remove_task(at.task)
+
+    def _step(self, job: str, fraction: float, text: str) -> None:
+        """Print the state of a job at every tenth."""
         step = int(STEPS * fraction)
         if step > self._steps.get(job, -1):
             self._steps[job] = step
@@ -176,12 +241,24 @@ class Screen(logging.Handler):
 
     def _done(self, job: str) -> None:
         """Print the line of a finished job."""
-        seconds = monotonic() - self._begun.get(job, monotonic())
-        told = f"{job}: {self._sums.get(job, DONE)} ({seconds:.0f} s)"
-        if self._progress is not None and job in self._tasks:
-            self._progress.remove_task(self._tasks.pop(job))
-            told = f"{FULL} {told}"
-        self._line(told)
+        at = self._at.get(job, At(monotonic()))
+        told = f"{job}: {self._sums.get(job, DONE)} ({monotonic() - at.begun:.0f} s)"
+        bar = f"{FULL} " * (at.task is not None)
+        self._forget(job)
+        self._line(f"{bar}{told}")
+
+
+def lasting(seconds: float) -> str:
+    """Return a time in minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+def _where(job: str, at: At) -> str:
+    if not job:
+        return at.text
+    state = f": {at.text}" if at.text else ""
+    return f"{job} {100 * at.fraction:.0f} %{state}"
 
 
 @contextmanager

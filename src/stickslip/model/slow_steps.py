@@ -1,6 +1,7 @@
 """Lines about steps that take long, so that nobody waits in front of a silent terminal.
 
 A step logs its line when it has run for `AFTER_S`, and only inside `told_when_slow`: logs of runs then do not depend on the speed of the machine.
+Everywhere it reports itself as the stage of the work, a record of progress, which the display repeats when nothing else is written.
 """
 
 import logging
@@ -37,6 +38,7 @@ def step(text: str, dofs: int = 0) -> Iterator[None]:
         Number of dofs of the step.
     """
     case = _CASE.get()
+    LOG.info(text, extra={"fraction": None})
     if case is None:
         yield
         return

@@ -28,7 +28,7 @@ from stickslip.study.store.attempts import (
 )
 from stickslip.study.store.folder import token_file
 from stickslip.study.store.journal import JobJournal
-from stickslip.study.store.progress import LOG, at_work
+from stickslip.study.store.progress import LOG, at_work, stage
 from stickslip.study.store.provenance import library_versions
 from stickslip.study.store.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched
 from stickslip.study.store.worker_process import Limits, blas_threads
@@ -230,6 +230,8 @@ def solve_job(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[
         LOG.info(f"{job.label} goes on after {len(done)} records of the earlier start")
     try:
         with at_work(job.label):
+            if done:
+                stage(f"going on after {len(done)} records")
             for record in asked.solve(job.inputs, done, journal):
                 journal.add(record)
     except NO_SOLUTION as error:

@@ -1,7 +1,7 @@
 """The runner: it works off the jobs of all analyses and writes each record to disk."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, fields, replace
@@ -31,10 +31,11 @@ from stickslip.study.store.attempts import file_at_work, new_owner
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
 from stickslip.study.store.journal import SEALED, JobJournal, read_sealed
 from stickslip.study.store.netcdf import attributes_there, write_tree
-from stickslip.study.store.progress import LOG, Interrupted, written_down
+from stickslip.study.store.progress import LOG, Interrupted, stage, written_down
 from stickslip.study.store.provenance import Provenance, as_text, library_versions
 from stickslip.study.store.worker_process import Limits, check_memory_limit
 from stickslip.study.store.workers import Hands, check_kind, executor
+from stickslip.study.verdict import together
 
 SHARE = 0.1  # of the time that a run may write what is not complete
 
@@ -174,11 +175,11 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
     if place.shard is not None:
         own = place.shard.own(_longest_first({t.sealed: t for t in tasks if t.analysis in asked}.values()))
         to_do = [t for t in to_do if t.sealed in {o.sealed for o in own}]
-    LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
+    LOG.info(f"jobs to do: {len(to_do)}, answers: {sum(t.analysis in asked for t in tasks)}")
     files: list[Path] = []
     with _hands(to_do, place) as hands:
         # all refusals come before any long computation, and before anything is given up
-        jobs = [_order(study, t, place) for t in to_do]
+        jobs = list(_orders(study, to_do, place, _labels(tasks)))
         if not fresh:
             _check_files(to_do)
             if place.shard is None:
@@ -192,7 +193,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
             with whole_file(files[-1]) as temporary:
                 write_mesh(mesh, temporary)
         show = _now_and_then(lambda: write_tree(book.tree(complete=False), target))
-        with closing(worked(jobs, hands, study.folder)) as finished:
+        with closing(_told(worked(jobs, hands, study.folder), len(jobs), hands)) as finished:
             for done, sealed in enumerate(finished, 1):
                 del unfinished[sealed]
                 if place.shard is None:
@@ -204,6 +205,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
             return place.shard.outcome(book, len(to_do), len(left), study.folder)
         unfinished = {t.sealed: t for t in tasks if not t.ended()}
         files = []
+    stage("putting the result together")
     book.read(tasks, unfinished)
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
@@ -266,9 +268,26 @@ def _limits(task: Task) -> Limits:
     return Limits(*(getattr(own, name, None) or inf for name in ("job_s", "job_memory_gb")))
 
 
-def _order(study: Study, task: Task, place: Place) -> Order:
+def _orders(study: Study, tasks: Sequence[Task], place: Place, labels: Mapping[Path, str]) -> Iterator[Order]:
+    for number, task in enumerate(tasks, 1):
+        stage(f"building {labels[task.sealed]}, {number} of {len(tasks)}")
+        yield _order(study, task, place, labels[task.sealed])
+
+
+def _told(finished: Generator[Path], count: int, hands: Hands) -> Generator[Path]:
+    """Yield the files of finished jobs, and report how many there are while other machines, whose progress is not heard, do the rest."""
+    with closing(finished):
+        if hands.far:
+            stage(f"{count} jobs are with the workers")
+        for done, sealed in enumerate(finished, 1):
+            yield sealed
+            if hands.far:
+                stage(f"{done} of {count} jobs done by the workers")
+
+
+def _order(study: Study, task: Task, place: Place, label: str) -> Order:
     """Return the job of a task for a worker."""
-    job = Job(_label(task.analysis, task.case), _inputs(study, task))
+    job = Job(label, _inputs(study, task))
     owner = "" if place.shard is None else new_owner()
     own = study.code
     code = Shipped(own.home, own.files) if own.files else None
@@ -315,7 +334,9 @@ def of_task(study: Study, case: Case) -> Iterator[None]:
     except InputError as error:
         place = f"{study.path} ({case.label})" if case.label else str(study.path)
         words = {"outside": "", "reach": "tolerance_m", "rim": f"tolerance_m = {TENFOLD}"}
-        raise error.called(words).inside(place) from None
+        named = error.called(words)
+        # the model has named the file already
+        raise named.under(str(study.path), place) from None
 
 
 def _inputs(study: Study, task: Task) -> Any:
@@ -338,6 +359,21 @@ def _check_files(tasks: Iterable[Task]) -> None:
 def _label(asked: Analysis, case: Case) -> str:
     words = asked.name.replace("_", " ")
     return f"{words}: {case.label}" if case.label else words
+
+
+def _labels(tasks: Sequence[Task]) -> dict[Path, str]:
+    """Name each job by its analysis and its cases; a job that answers all cases bears no case."""
+    cases: dict[Path, list[Task]] = {}
+    for task in tasks:
+        cases.setdefault(task.sealed, []).append(task)
+    every = {name: sum(t.analysis.name == name for t in tasks) for name in {t.analysis.name for t in tasks}}
+    found = {}
+    for sealed, own in cases.items():
+        first = own[0]
+        words = first.analysis.name.replace("_", " ")
+        label = together([t.case.label for t in own]) if len(own) < every[first.analysis.name] else ""
+        found[sealed] = f"{words}: {label}" if label else words if len(own) > 1 else _label(first.analysis, first.case)
+    return found
 
 
 def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:

@@ -61,11 +61,12 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.by_shooting import shooting_response
+from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
 from stickslip.study.models.measured import MeasuredPeaks
-from stickslip.study.store.progress import LOG, advance, sum_up
+from stickslip.study.store.progress import LOG, advance, stage, sum_up
 from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ, millimetres
 
@@ -99,6 +100,8 @@ def _inputs(case: Case, model: Model) -> Question:
 def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
     """Yield the missing points, then store data for the dataset and the requested checks."""
     points = list(done)
+    if points:
+        advance(*progress(points[-1], inputs.sweep))
     failure: Exception | None = None
     try:
         for point in _points(inputs, done, notes):
@@ -112,14 +115,17 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
     response, examined = yield from with_stability(inputs, points, notes)
     _store_notes(inputs, response, examined, notes)
     if inputs.model.blades is not None and notes.get(BLADES) is None:
+        stage("the blades of the wheel")
         notes.put(BLADES, of_blades(inputs, response))
     if failure is not None and response.top is None:
         raise failure  # nothing to judge
     told = _judge(inputs, response, examined, notes)
     if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
+        stage("bifurcations and side branches")
         notes.put(BIFURCATIONS, _bifurcations(inputs, response, told, notes))
     _check_harmonics(inputs, response, notes)
     if notes.get(PHYSICS) is None:
+        stage("what the peak owes to the model: more modes, softer contacts")
         notes.put(PHYSICS, _of_physics(inputs, response))
     if failure is not None:
         raise failure
@@ -146,11 +152,14 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
     """Yield the missing points."""
     if notes.get("finished") is not None:
         return
+    stage("compiling the contact laws")
     _compile(question)
     model = question.model
+    stage("natural frequencies")
     lines = (*unreduced_line(model), *model.frequencies.lines()) if question.first else ()
     for line in lines:
         LOG.info(line)
+    stage("static equilibrium and the first motion")
     for point in _solved(question, done):
         yield point
         advance(*progress(point, question.sweep))
@@ -181,6 +190,7 @@ def _store_notes(question: Question, response: Response, examined: Sequence[Exam
     """Store all data for the dataset, once."""
     if notes.get("response") is not None:
         return
+    stage("what more harmonics change at the peak")
     shift = peak_shift(question, response)
     notes.put("model", of_model(question, response.output))
     told = stored(KnownVerdicts(known_verdicts=to_json(known(question, response, shift))))
@@ -219,6 +229,7 @@ def _answer_in_time(question: Question, response: Response, examined: Sequence[E
     """Integrate in time at points without a valid periodic motion, once."""
     if notes.get(NOT_PERIODIC) is not None:
         return
+    stage("points without a periodic motion, in time")
     answers = [
         in_time_instead(question, response, omega, why, question.not_periodic_s * FLOPS, multiplier)
         for omega, why, multiplier in without_periodic(question, response, examined)
@@ -243,10 +254,12 @@ def _bifurcations(question: Question, response: Response, examined: Sequence[Exa
 def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:
     """Predict the change by more harmonics, and compare Jacobians, where that is asked for."""
     if HARMONICS in question.checks:
+        stage("what more harmonics change at every point")
         doubt = check_harmonics(question, response)
         LOG.info(f"more harmonics: {question.said(doubt.sentence)}")
         notes.put(HARMONICS, of_doubt(doubt))
     if question.similarity and notes.get(JACOBIANS) is None:
+        stage("Jacobians with few and many harmonics")
         notes.put(JACOBIANS, of_jacobians(question, response))
 
 
@@ -282,7 +295,7 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     state += "" if marched is None else f", {marched}"
     return (
         begin + width * along,
-        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",
+        f"{IN_WORDS[point.stage]}, point {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",
     )
 
 
@@ -290,6 +303,21 @@ def _values(solved: Solved) -> Values:
     """Return all stored variables of a job."""
     return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
 
+
+IN_WORDS: dict[Stage, str] = {
+    "low": "low harmonics",
+    "high": "more harmonics",
+    "branch": "branch of more harmonics",
+    "peak": "peak",
+    "point": "harmonics of each point",
+    "audit": "audit of the harmonics",
+    "trial": "trial of more harmonics",
+    "found": "passage",
+    "check": "harmonics of the peak",
+    "in_time": "start in time",
+    "settled": "harmonics settled",
+    "compared": "harmonics compared",
+}
 
 FORCED_RESPONSE = Analysis(
     name="forced_response",

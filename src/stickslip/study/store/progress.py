@@ -1,6 +1,6 @@
 """Progress and messages of a run, by the standard logging.
 
-Records of progress carry ``fraction`` (0 to 1); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
+Records of progress carry ``fraction`` (0 to 1, or None for a stage whose share is not known); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
 """
 
 import logging
@@ -28,6 +28,11 @@ class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
 def advance(fraction: float, text: str) -> None:
     """Report the finished fraction of the running job, and its state in words."""
     LOG.info(text, extra={"fraction": fraction, "job": _JOB.get()})
+
+
+def stage(text: str) -> None:
+    """Report what the running job does now, where its finished fraction is not known."""
+    LOG.info(text, extra={"fraction": None, "job": _JOB.get()})
 
 
 def tell(word: str, text: str) -> None:

@@ -26,7 +26,7 @@ from stickslip.analyses.forced_response.stability.stable import (
 from stickslip.errors import InputError
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.study.analysis import Notes, Pieces
-from stickslip.study.store.progress import LOG
+from stickslip.study.store.progress import LOG, stage
 from stickslip.units import HZ
 
 MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
@@ -59,6 +59,7 @@ class Looked:
         """Return the stability of a point."""
         name, self.count = f"{STABLE}.{self.count}", self.count + 1
         known, pieces = self.notes.get(name), Pieces(self.notes, name)
+        stage(f"stability, point {self.count}: {accepted.point.omega / HZ:.2f} Hz")
         one = from_note(known, accepted.point) if known else examine(self.question, accepted, pieces.keep)
         self.taken += bool(known)
         self.notes.put(name, as_note(one))
@@ -172,6 +173,7 @@ def integrated(
     if known:
         check = Check(**known)
     else:
+        stage(f"check in time: {omega / HZ:.2f} Hz")
         doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
         check = check_in_time(question, response, accepted, *doubted)
     notes.put(name, asdict(check))
