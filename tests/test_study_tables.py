@@ -421,6 +421,14 @@ WRONG = [
     ),
     ({"part.blades.pitch_m": "0.009"}, "part.blades.pitch_m: 0.009 m leaves no room for platforms"),
     ({"part.damper.mass_kg": f'"{"9" * 10_000}"'}, "part.damper.mass_kg: must be a number, got '999"),
+    (
+        {"part.damper.shape": '"flat_curvd"', "vary.part.damper.mass_kg": "[0.01]"},
+        "part.damper.shape: is not known, got 'flat_curvd'. Did you mean 'flat_curved'?",
+    ),
+    (
+        {"part.damper.mass_kg": "-0.02", "vary.part.damper.mass_kg": "[0.01]"},
+        "study.toml: part.damper.mass_kg: must be greater than 0, got -0.02.",
+    ),
     ({"vary.load.shaker.ratios": "[1, 2]"}, "vary.load.shaker.ratios: there is no key 'ratios'. Did you mean 'ratio'?"),
     (
         {"vary.part.damber.mass_kg": "[1.0]"},

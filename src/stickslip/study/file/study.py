@@ -11,7 +11,7 @@ from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import told
 from stickslip.study.file.tables import VERSION, Tables, study_tables
 from stickslip.study.file.toml import read_toml
-from stickslip.study.file.vary import VariedCase, cases_of, with_values
+from stickslip.study.file.vary import VariedCase, cases_of, value_at, varied_keys, with_values
 from stickslip.study.own_code import OwnCode
 
 
@@ -93,8 +93,9 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
     _check_version(path, raw.get("schema_version"))
     model = study_tables()
     found: list[TablesOfCase] = []
-    errors: dict[str, InputError] = {}
-    for case in cases_of(str(path), raw, model):
+    cases = cases_of(str(path), raw, model)
+    errors = {str(one): one for one in _of_replaced(path, raw, code)}
+    for case in cases:
         try:
             found.append(_case(path, raw, case, code))
         except InputError as error:  # what is wrong in many cases is told once
@@ -102,6 +103,19 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
     if errors:
         raise together(errors.values())
     return tuple(found)
+
+
+def _of_replaced(path: Path, raw: Mapping[str, Any], code: OwnCode) -> list[InputError]:
+    """Return what is wrong with values that [vary] replaces in every case: nobody would see that they are never used."""
+    varied = {f"{path}: {key}" for key in varied_keys(str(path), raw)}
+    given = {key for key in varied if value_at(raw, key.removeprefix(f"{path}: ")) is not None}
+    if not given:
+        return []
+    try:
+        _case(path, raw, VariedCase("", {}), code)
+    except InputError as error:
+        return [one for one in error.each() if one.place in given]
+    return []
 
 
 def _case(path: Path, raw: Mapping[str, Any], case: VariedCase, code: OwnCode) -> TablesOfCase:

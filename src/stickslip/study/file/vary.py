@@ -100,9 +100,7 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
     InputError
         Naming each key, and how to give it another list or none.
     """
-    given = raw.get("vary", {})
-    tables = given if isinstance(given, list) else [given]
-    varied = {key: found for table in tables for key, found in _flat(place, table, []) if key != NAME}
+    varied = varied_keys(place, raw)
     errors = [
         input_error(
             f"{place}: {key}",
@@ -114,6 +112,21 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
     ]
     if errors:
         raise together(errors)
+
+
+def varied_keys(place: str, raw: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Return the keys of [vary] with their lists."""
+    given = raw.get("vary", {})
+    tables = given if isinstance(given, list) else [given]
+    return {key: found for table in tables for key, found in _flat(place, table, []) if key != NAME}
+
+
+def value_at(raw: Mapping[str, Any], key: str) -> Any:
+    """Return the value of a key outside of [vary]; None if it is not given."""
+    here: Any = raw
+    for name in key.split("."):
+        here = here.get(name) if isinstance(here, Mapping) else None
+    return here
 
 
 def _flat(
@@ -169,6 +182,8 @@ def _unknown(place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel
     content: Any = raw
     here: Any = model
     for i, name in enumerate(key.split(".")):
+        if alternatives(here) and not _chosen(here, content):
+            return []  # the table is refused itself, since nothing says of which kind it is
         known, here = _below(here, content, name)
         if name not in known or (i == 0 and name in ("vary", "schema_version", "title")):
             return [input_error(f"{place}: vary.{key}", f"there is no key {name!r}", nearest_key(name, known))]
