@@ -149,6 +149,29 @@ def test_records_of_a_result_have_the_rows_of_one_case_and_missing_values_for_wh
     assert apart.frequency_hz.tolist() == [10.0, 12.0, 15.0]
 
 
+def test_verdicts_that_differ_in_the_case_alone_are_told_once() -> None:
+    """As a designer sees them who varies the mass of a damper and its friction."""
+    cannot = "damper in static equilibrium: left cannot slip to and fro, T/N reaches only {}"
+    masses = ["5 g", "10 g", "20 g"]
+    given = [
+        Verdict("trusted", f"{mass}, mu {mu}", None, cannot.format(share), "See the angles.")
+        for mass in masses
+        for mu, share in ((0.3, "0.14 of 0.3"), (0.5, "0.37 of 0.5"))
+    ]
+    first, second = (f"NOTE: 5 g, 10 g, 20 g, each with mu {mu}: " for mu in (0.3, 0.5))
+    texts = [cannot.format("0.14 of 0.3"), cannot.format("0.37 of 0.5")]
+    assert in_lines(given, every=True) == [
+        f"{first}{texts[0]}. See the angles.",
+        f"{second}{texts[1]}. See the angles.",
+    ]
+    assert in_lines(given) == [f"{first}{texts[0]}. See the angles. Likewise: 5 g, 10 g, 20 g, each with mu 0.5."]
+    assert concluded(given, "", bad=False).counts == "2 notes"
+    # no product of values: each case by its name
+    assert together(["5 g, mu 0.3", "10 g, mu 0.5"]) == "5 g, mu 0.3; 10 g, mu 0.5"
+    assert together(["5 g, mu 0.3", "5 g, mu 0.5", "10 g, mu 0.3", "10 g, mu 0.5"]) == "5 g, 10 g with mu 0.3, 0.5"
+    assert together(["5 g, 10 g, each with mu 0.3", "20 g, mu 0.5"]) == "5 g, 10 g, each with mu 0.3; 20 g, mu 0.5"
+
+
 def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     """As a terminal has them."""
     fold = "stability undecided, modulus {}"
@@ -176,13 +199,13 @@ def test_lines_name_what_is_alike_once_and_all_of_them_on_request() -> None:
     assert page.counts == "4 doubtful"
     assert [v.case for v in page.good] == ["k = 1", "k = 3"]
     assert page.kind == "bad"
-    assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "a = 1, b = 2, a = 1, b = 3"
+    assert together(["a = 1, b = 2", "a = 1, b = 3"]) == "b = 2, 3, each with a = 1"
     assert together(["a = 1", "a = 2"]) == "a = 1, 2"
     assert together(["force 3 N", "force 5 N", "force 7 N"]) == "force 3 N, 5 N, 7 N"
     assert together(["10 g", "20 g"]) == "10 g, 20 g"
     assert together(["friction coefficient 0.4"]) == "friction coefficient 0.4"
     assert together(["a = 1", "b = 1"]) == "a = 1, b = 1"
-    assert together(["a = 1", "a = 1, b = 3"]) == "a = 1, a = 1, b = 3"
+    assert together(["a = 1", "a = 1, b = 3"]) == "a = 1; a = 1, b = 3"
     assert together(["a = 1"]) == "a = 1"
 
 

@@ -20,7 +20,7 @@ from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
 from stickslip.study.store.atomic_write import write_whole
-from stickslip.study.verdict import Verdict, likewise, of_kinds, worst_first
+from stickslip.study.verdict import Verdict, likewise, of_kinds, once, worst_first
 
 _CONFIG = {
     "responsive": True,
@@ -163,13 +163,13 @@ def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusio
         Whether a case or an analysis is not trusted.
     """
     every = worst_first(verdicts)
-    told_of = [v for v in every if v.told]
+    told_of = [v for v in once(every) if v.told]
     warns = any(v.rank or v.warns for v in told_of)
     kind: Literal["good", "some", "bad"] = "bad" if bad else "some" if warns else "good"
     words = Counter(v.word for v in told_of)
     counts = ", ".join(f"{n} {word}{'s' * (n > 1 and word in PLURAL)}" for word, n in words.items())
     causes = [Cause(first, others) for first, *others in of_kinds(told_of)]
-    return Conclusion(told, kind, counts, causes, [v for v in every if not v.told])
+    return Conclusion(told, kind, counts, causes, once(v for v in every if not v.told))
 
 
 def anchor(key: str) -> str:

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import takewhile
+from itertools import product, takewhile
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,6 +15,8 @@ LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a datase
 UNSTABLE = "unstable"  # of a point: an answer, which a machine does not stay at
 POINT_LEVELS = (*LEVELS, UNSTABLE)  # numbers of the verdict on a point
 ATTRIBUTE = "verdicts"  # of the dataset of an analysis
+JOINT = ", "  # between the parts of a case's name, as `case_names` writes it
+WITH = " with "  # between the values of several parts
 ALIKE = 20  # characters that two verdicts of one kind share before their first number, at least
 _NUMBER = re.compile(r"\d")
 INCOMPLETE = "the run is not complete"
@@ -129,19 +131,44 @@ def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
 
 
 def together(labels: Sequence[str]) -> str:
-    """Join names of cases to one line; the words that all begin with are written once."""
+    """Join names of cases to one line; the words that all begin with, and the parts that all have, are written once."""
+    if any(WITH in label for label in labels):  # of several cases already
+        return "; ".join(labels)
+    if len(labels) > 1 and any(JOINT in label for label in labels):
+        return _by_parts([tuple(label.split(JOINT)) for label in labels])
     words = zip(*(label.split(" ")[:-1] for label in labels), strict=False)
     common = [own[0] for own in takewhile(lambda own: len(set(own)) == 1, words)]
-    if not common or any(", " in label for label in labels):
+    if not common:
         return ", ".join(labels)
     head, *rest = labels
     return ", ".join([head, *(label.removeprefix(f"{' '.join(common)} ") for label in rest)])
 
 
+def _by_parts(labels: Sequence[tuple[str, ...]]) -> str:
+    """Join names of cases of several parts: values of the parts that differ if these are all their combinations, then the parts that all have."""
+    plain = "; ".join(JOINT.join(parts) for parts in labels)
+    if len({len(parts) for parts in labels}) > 1:
+        return plain
+    columns = [list(dict.fromkeys(column)) for column in zip(*labels, strict=True)]
+    if set(labels) != set(product(*columns)):
+        return plain
+    differing = WITH.join(together(values) for values in columns if len(values) > 1)
+    same = JOINT.join(values[0] for values in columns if len(values) == 1)
+    return f"{differing}, each{WITH}{same}" if same else differing
+
+
+def once(verdicts: Iterable[Verdict]) -> list[Verdict]:
+    """Return verdicts in their order; those that differ in nothing but the case become one, of all their cases."""
+    cases: dict[Verdict, list[str]] = {}
+    for v in verdicts:
+        cases.setdefault(replace(v, case=""), []).append(v.case)
+    return [replace(v, case=together(list(dict.fromkeys(own))) if all(own) else "") for v, own in cases.items()]
+
+
 def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:
-    """Group verdicts by kind, the worst kind first. Verdicts of a kind agree up to their first number; plain trusted cases form one kind."""
+    """Group verdicts by kind, the worst kind first, equal ones of several cases as one. Verdicts of a kind agree up to their first number; plain trusted cases form one kind."""
     kinds: dict[tuple[str, ...], list[Verdict]] = {}
-    for v in worst_first(verdicts):
+    for v in worst_first(once(verdicts)):
         own: tuple[str, ...] = (v.word, _gist(v.why), _gist(v.remedy))
         if len(own[1]) < ALIKE:
             own = (str(v),)
@@ -157,9 +184,9 @@ def likewise(others: Sequence[Verdict]) -> str:
 
 
 def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
-    """Return verdicts as lines, worst first: one line a kind with the places of the others, or with `every` one line a verdict."""
+    """Return verdicts as lines, worst first: one line a kind with the places of the others, or with `every` one line a verdict that differs."""
     if every:
-        return [str(v) for v in worst_first(verdicts)]
+        return [str(v) for v in worst_first(once(verdicts))]
     lines = []
     for first, *others in of_kinds(verdicts):
         if first.case and not first.told and others:
