@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_v2 import write_four_masses
 from synthetic_result import KEY, synthetic_result, tree_of
 from typer.testing import CliRunner
 
@@ -219,7 +220,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
         ss.compare(file)
     with pytest.raises(ss.InputError, match=r"are no 2 names that differ"):
         ss.compare(one, one, names=("a", "a"))
-    with pytest.raises(ss.InputError, match=r"none: no such file|none.*no such file"):
+    with pytest.raises(ss.InputError, match="none: does not exist"):
         ss.compare(one, tmp_path / "none")
     with pytest.raises(ss.InputError, match="has no forced response to be held against"):
         ss.compare(ss.Result(tree_of(modes=synthetic_result(ratios=(5,), n=8))), file)
@@ -240,9 +241,28 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert told.exit_code == 0, told.output
     assert "contact.flat.friction_coefficient" in told.output
     assert "first and second compared" in page.read_text(encoding="utf-8")
+    assert "peak (µm/N)" in told.output  # in the unit of the page
+    assert "designs are the same" not in told.output
     wrong = CliRunner().invoke(app, ["compare", str(tmp_path / "first"), str(tmp_path)])
     assert wrong.exit_code == 2
     assert "no such file" in wrong.output
+    asked = [str(tmp_path / "first"), str(tmp_path / "first" / "results" / "result.nc"), "--page", str(page)]
+    told = CliRunner().invoke(app, ["compare", *asked])
+    assert "The designs are the same: nothing differs in their inputs, nor in their peaks." in told.output
+    assert "equal to the best peak of" in page.read_text(encoding="utf-8")
+
+
+def test_all_that_cannot_be_compared_is_named_with_what_to_do(tmp_path: Path) -> None:
+    begun = write_four_masses(tmp_path / "begun")
+    (tmp_path / "begun" / "results" / "jobs").mkdir(parents=True)
+    new = write_four_masses(tmp_path / "new")
+    told = CliRunner().invoke(app, ["compare", *(str(tmp_path / name) for name in ("begun", "new", "missing"))])
+    assert told.exit_code == 2
+    assert told.output.splitlines() == [
+        f"{begun}: has no result, its run has not ended yet. Run it first: stickslip run {begun}.",
+        f"{new}: has no result, it was not run. Run it first: stickslip run {new}.",
+        f"{tmp_path / 'missing'}: does not exist. Give a result, the folder of a study that was run, or a CSV file.",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -275,9 +275,14 @@ def compare(
         from stickslip.api.table import cells
 
         found = compared_designs(*compared, names=name or ())
-        for title, table in (("Peaks", found.peaks), ("What differs", found.inputs)):
-            if len(table):
-                say_columns(title, table, cells(table))
+        for title, (head, rows) in (
+            ("Peaks", found.peaks_in_words()),
+            ("What differs", (list(found.inputs), cells(found.inputs))),
+        ):
+            if rows:
+                say_columns(title, head, rows)
+        if found.same:
+            say("The designs are the same: nothing differs in their inputs, nor in their peaks.")
         say_lines("Files", [str(found.report(page))])
 
 
@@ -354,8 +359,9 @@ def compile_() -> None:
         from stickslip.study.store.threads import one_blas_thread
 
         one_blas_thread()
-        for done in compile_ahead(os.cpu_count() or 1):
-            say(f"compiled: {done}")
+        say("Compiling contact laws and time steps. What is compiled is kept if this is stopped.")
+        for done, left in compile_ahead(os.cpu_count() or 1):
+            say(f"compiled: {done}{f', {left} left' * (left > 0)}")
 
 
 @app.command()

@@ -11,17 +11,19 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force, read_curve
-from stickslip.analyses.compared.side_by_side import comparison_html, contents, peak_rows, unit_of
+from stickslip.analyses.compared.side_by_side import comparison_html, contents, peak_rows, peaks, unit_of
 from stickslip.api.figures import Backend, plotted
 from stickslip.api.result import Result
 from stickslip.api.study import Study
 from stickslip.api.table import as_text
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error, together
 from stickslip.report.frame import write_page
 from stickslip.report.plot import Plot
 from stickslip.report.result import RESULT
+from stickslip.study.store.folder import JOBS
 
 Compared = str | Path | Result
+STUDY = "study.toml"  # in the folder of a study
 _FOLDER = "results"  # of a study that names no other
 
 
@@ -87,6 +89,19 @@ class Comparison:
         columns = zip(*rows, strict=True) if rows else [() for _ in head]
         return pd.DataFrame({n: np.array(own) for n, own in zip(head, columns, strict=True)})
 
+    def peaks_in_words(self) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
+        """Return head and cells of the peaks in a unit that suits them, as on the page."""
+        found = peaks(self.designs, divided=per_force(self.designs, self.curves))
+        return ((), ()) if found is None else (found.head, found.rows)
+
+    @property
+    def same(self) -> bool:
+        """Whether the designs have the same inputs and the same peaks."""
+        if len(self.designs) < 2 or self.curves or len(self.inputs) or not len(self.peaks):
+            return False
+        off = self.peaks["against the first (%)"].to_numpy()
+        return bool(np.isfinite(off).any() and np.nanmax(np.abs(off)) == 0.0)
+
     def report(self, path: str | Path = "comparison.html") -> Path:
         """Write the page; return its path."""
         target = Path(path)
@@ -114,7 +129,7 @@ def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
     InputError
         If something cannot be read, nothing can be compared, or two names are equal.
     """
-    given = [_opened(own) for own in compared]
+    given = _all_opened(compared)
     results = [own for own in given if isinstance(own, Result)]
     if len(given) < 2 or not results:
         raise input_error(
@@ -137,6 +152,20 @@ def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
     return Comparison(tuple(designs), tuple(curves))
 
 
+def _all_opened(compared: Sequence[Compared]) -> list[Result | MeasuredCurve]:
+    """Return what is compared; one error names all that cannot be read."""
+    given: list[Result | MeasuredCurve] = []
+    errors: list[InputError] = []
+    for own in compared:
+        try:
+            given.append(_opened(own))
+        except InputError as error:
+            errors.append(error)
+    if errors:
+        raise together(errors)
+    return given
+
+
 def _opened(given: Compared) -> Result | MeasuredCurve:
     if isinstance(given, Result):
         return given
@@ -144,10 +173,25 @@ def _opened(given: Compared) -> Result | MeasuredCurve:
     if path.suffix.lower() == ".csv":
         return read_curve(path)
     if path.suffix == ".toml":
-        return Result.from_file(Study.from_file(path).folder)
+        return _of_study(path)
     if path.is_dir() and not (path / RESULT).is_file() and (path / _FOLDER / RESULT).is_file():
         return Result.from_file(path / _FOLDER)
+    if path.is_dir() and not (path / RESULT).is_file() and (path / STUDY).is_file():
+        return _of_study(path / STUDY)
+    if not path.exists():
+        raise input_error(
+            str(path), "does not exist", "Give a result, the folder of a study that was run, or a CSV file."
+        )
     return Result.from_file(path)
+
+
+def _of_study(path: Path) -> Result:
+    """Return the result of a study file."""
+    folder = Study.from_file(path).folder
+    if not (folder / RESULT).is_file():
+        begun = "its run has not ended yet" if (folder / JOBS).is_dir() else "it was not run"
+        raise input_error(str(path), f"has no result, {begun}", f"Run it first: stickslip run {path}.")
+    return Result.from_file(folder)
 
 
 def _names(compared: Sequence[Compared]) -> list[str]:

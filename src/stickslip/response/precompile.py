@@ -71,7 +71,7 @@ TASKS: dict[str, Callable[[], None]] = {
 }
 
 
-def compile_ahead(workers: int) -> Iterator[str]:
+def compile_ahead(workers: int) -> Iterator[tuple[str, int]]:
     """Compile all kernels that are cached on disk.
 
     Parameters
@@ -81,17 +81,20 @@ def compile_ahead(workers: int) -> Iterator[str]:
 
     Yields
     ------
-    str
-        Name of each compiled part.
+    tuple
+        Name of each compiled part, and the number of those that are left.
     """
-    for law in LAWS.values():  # compiled here, and not in each process
-        _ = law.kernel  # type: ignore[attr-defined]
-    yield "contact laws"
+    left = len(LAWS) + len(TASKS)
+    for name in LAWS:  # compiled here, and not in each process
+        _ = LAWS[name].kernel  # type: ignore[attr-defined]
+        left -= 1
+        yield f"contact law {name}", left
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         tasks = {pool.submit(task): name for name, task in TASKS.items()}
         for task in as_completed(tasks):
             task.result()
-            yield tasks[task]
+            left -= 1
+            yield tasks[task], left
 
 
 def _gaps(contacts: int) -> FloatArray:

@@ -426,7 +426,8 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
             note += f"; loaded by {quantity(case.excitation, 'N')}, {against} by {quantity(loaded, 'N')}: not compared"
         else:
             off = over_first(height, first)
-            note += f"; {percent(abs(off), 3)} {'more' if off > 0 else 'less'} than {against}"
+            how = f"{percent(abs(off), 3)} {'more' if off > 0 else 'less'} than" if off else "equal to the"
+            note += f"; {how} {against}"
         found.append(Card(quantity(height, unit), label.format(design.name), note))
     return found
 
