@@ -13,6 +13,8 @@ VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2
 BIN := $(VENV)/bin
 # another Python is another installation, and makes .venv anew
 INSTALLED := $(VENV)/.installed-$(VERSION)
+# an installation that was stopped goes on with this environment
+MADE := $(VENV)/.made-$(VERSION)
 DOCS_INSTALLED := $(VENV)/.docs-installed-$(VERSION)
 OPTIONAL_INSTALLED := $(VENV)/.optional-installed-$(VERSION)
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
@@ -38,7 +40,9 @@ $(INSTALLED): requirements.lock pyproject.toml
 	@test -n "$(VERSION)" || { echo "No Python found. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3.12"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "$(PYTHON) is Python $(VERSION), and 3.11 is the oldest that does. Name one: make PYTHON=/path/to/python3.12"; exit 1; }
-	$(PYTHON) -m venv $(if $(wildcard $@),,--clear) $(VENV)
+	$(PYTHON) -m venv $(if $(wildcard $@ $(MADE)),,--clear) $(VENV)
+	@touch $(MADE)
+	@echo "Installing the locked versions: nothing is printed until they are there."
 	$(PIP_INSTALL) --no-deps --require-hashes -r requirements.lock
 	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@$(BIN)/python .ci/system_libraries.py

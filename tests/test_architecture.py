@@ -273,6 +273,16 @@ def test_readme_commands_are_make_targets():
         assert used, page
 
 
+def test_an_installation_that_was_stopped_goes_on(tmp_path):
+    asked = ["make", "-n", "install", f"VENV={tmp_path}", f"PYTHON={sys.executable}"]
+    told = subprocess.run(asked, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    assert f"-m venv --clear {tmp_path}" in told
+    (tmp_path / f".made-{sys.version_info[0]}.{sys.version_info[1]}").touch()
+    told = subprocess.run(asked, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    assert "-m venv" in told
+    assert "--clear" not in told
+
+
 def test_the_readme_reads_alone_and_names_files_that_exist():
     """Where a package index shows it, relative links lead nowhere: it names files, and its only relative address is the picture's."""
     page = (ROOT / "README.md").read_text()
