@@ -220,7 +220,9 @@ def space(low: FloatArray, high: FloatArray, *, close: bool, seen: dict[str, flo
     eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
     if close:
         eye, size = seen or {"x": 0.32, "y": -1.5, "z": -0.8}, 1.6 if seen else 1.3
-    span = size * (high - low) / (high - low).max()
+    extent = high - low
+    # nodes that all lie on one point have no extent
+    span = size * (extent / extent.max() if extent.max() > 0.0 else np.ones(3))
     axes = {
         f"{name}axis": {
             "range": [float(a), float(b)],
