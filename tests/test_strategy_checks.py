@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
+import stickslip as ss
 from evidence.models.lumped import griffin
-from stickslip.errors import InputError
+from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
-from stickslip.harmonic.selection.strategy import Verdict
+from stickslip.harmonic.selection.strategy import Verdict, judged
 from stickslip.response.forced.response import Sweep, forced_response
 
 RANGE = (0.9, 1.3)
@@ -31,6 +33,13 @@ class NoThreshold:
         raise AssertionError
 
 
+class NoVerifies:
+    threshold = 0.05
+
+    def judge(self, _):
+        raise AssertionError
+
+
 class Undecided(Own):
     verifies = None
 
@@ -40,7 +49,8 @@ class Undecided(Own):
     [
         (JacobianAlert, r"is the class JacobianAlert\. Make one: JacobianAlert\(\)"),
         (3.0, "is a float, which has no method judge"),
-        (NoThreshold(), r"NoThreshold\.threshold: is None"),
+        (NoThreshold(), r"NoThreshold\.threshold: is missing"),
+        (NoVerifies(), r"NoVerifies\.verifies: is missing\. True: a verdict says how good"),
         (Own(None, threshold=float("nan")), r"Own\.threshold: is nan"),
         (Undecided(None), r"Undecided\.verifies: is neither True nor False"),
     ],
@@ -55,6 +65,12 @@ def test_what_cannot_be_asked_is_refused_at_once(wrong, message):
     ("answer", "message"),
     [
         (0.3, r"Own\.judge: returned a float\. Return a Verdict"),
+        (
+            Verdict(float("nan"), None, (0, 1)),
+            r"Own\.judge: returned the indicator nan\. Return a finite number: above",
+        ),
+        (Verdict(float("inf"), None, (0, 1)), r"Own\.judge: returned the indicator inf"),
+        (Verdict("loud", None, (0, 1)), r"Own\.judge: returned the indicator 'loud'"),
         (Verdict(1.0, (0, 1, 9), (0, 1)), "asks for harmonics 9, which the reference does not"),
         (Verdict(0.0, None, (0, 1, 7)), "asks for harmonics 7, which the reference does not"),
     ],
@@ -63,3 +79,49 @@ def test_verdicts_that_cannot_be_followed_are_refused(answer, message, passages)
     sweep = Sweep(omega_range=RANGE, selection=Own(answer), passages=passages, frequencies=4)
     with pytest.raises(InputError, match=message):
         list(forced_response(*griffin(0.1), sweep))
+
+
+class Solves(Own):
+    def judge(self, _):
+        return np.linalg.solve(np.array(1.0), np.ones(1))  # no matrix: an error of its own, not of the balance
+
+
+class NoStep(Own):
+    def judge(self):
+        raise AssertionError
+
+
+class OfThePackage(Own):
+    def judge(self, _):
+        raise SingularError("dof x")
+
+
+@pytest.mark.parametrize(
+    ("strategy", "message", "cause"),
+    [
+        (
+            Solves(None),
+            r"Solves\.judge: raises LinAlgError: .* See test_strategy_checks\.py, line \d+",
+            np.linalg.LinAlgError,
+        ),
+        (NoStep(None), r"NoStep\.judge: raises TypeError: .* Let it take \(self, step\)", TypeError),
+    ],
+)
+def test_what_a_strategy_raises_names_it_and_its_line(strategy, message, cause):
+    with pytest.raises(InputError, match=message) as told:
+        judged(strategy, None)
+    assert isinstance(told.value.__cause__, cause)
+
+
+def test_errors_of_the_package_go_through_a_strategy():
+    with pytest.raises(SingularError, match="dof x"):
+        judged(OfThePackage(None), None)
+
+
+def test_a_model_tells_what_its_strategy_raises():
+    chain = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1), names=("x",))
+    damper = ss.Contact(between=("c.x", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.035), acts="tangential")
+    loads = {"shaker": ss.Load(on="c.x", newton=0.1)}
+    model = ss.Model(parts={"c": ss.Part(structure=chain)}, contacts={"damper": damper}, loads=loads)
+    with pytest.raises(InputError, match=r"Solves\.judge: raises LinAlgError"):
+        model.forced_response((0.02, 0.1), high=3, points=3, peak_points=0, stability="off", selection=Solves(None))

@@ -90,7 +90,7 @@ class Model(Assembly):
         """
         given: dict[str, Any] = {**keys}
         if hz is not None:
-            own = [float(f) for f in hz]
+            own = _frequencies(hz)
             given["frequency_hz" if len(own) == 2 else "frequencies_hz"] = own
         asked = {"verify": verify, "verify_harmonics": verify_harmonics}
         checks = frozenset(name for name, wanted in asked.items() if wanted)
@@ -290,12 +290,37 @@ for _name in ANALYSES:
     getattr(Model, _name).__signature__ = _with_keys(_name)
 
 
+def _frequencies(hz: object) -> list[float]:
+    """Return the frequencies of a range or a list, Hz."""
+    example = "Give a range: hz=(8, 16), or a list of frequencies: hz=[8, 10, 12]."
+    if isinstance(hz, int | float):
+        raise input_error("forced_response: hz", f"is one number, {hz:g}", example)
+    try:
+        return [float(f) for f in hz]  # type: ignore[attr-defined]  # tried
+    except (TypeError, ValueError):
+        raise input_error("forced_response: hz", f"is {hz!r}, which holds no numbers", example) from None
+
+
+def _of_a_table(table: str, own: type[Section], value: Any) -> str:
+    """Return the remedy for a table of a study file that is given as one key."""
+    if table == "harmonics" and not isinstance(value, Mapping):
+        return f"Its keys stand alone. The highest harmonic is harmonics.high: high={value!r}."
+    given = (
+        [key for key in value if key in own.model_fields] if isinstance(value, Mapping) else list(own.model_fields)[:3]
+    )
+    return f"Its keys stand alone: {', '.join(f'{key}=…' for key in given)}."
+
+
 def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
     """Sort keys into the tables of an analysis and validate them."""
     sections = _sections(name)
     home = {key: table for table, own in sections.items() for key in own.model_fields}
     values: dict[str, dict[str, Any]] = {table: {} for table in sections}
     for key, value in keys.items():
+        if key in sections and key not in home:
+            raise input_error(
+                f"{name}: {key}", "is a table of a study file, no key", _of_a_table(key, sections[key], value)
+            )
         if key not in home or key in OF_THE_MODEL:
             known = [k for k in home if k not in OF_THE_MODEL]
             raise input_error(f"{name}: {key}", "is no key of this question", nearest_key(key, known, value))

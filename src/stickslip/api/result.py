@@ -26,6 +26,8 @@ from stickslip.study.outcome import Outcome
 from stickslip.study.store.netcdf import write_tree
 from stickslip.study.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
 
+WITH_PEAKS = ("forced_response", "modes", "safe")  # analyses of which `Result.peaks` is a table
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
@@ -223,11 +225,24 @@ class Result:
 
     @property
     def peaks(self) -> pd.DataFrame:
-        """The peak of each case of the forced response, a row a case; without one, the natural frequencies, a row a wave."""
+        """The peak of each case of the forced response, a row a case; without one, the natural frequencies, a row a wave.
+
+        Raises
+        ------
+        InputError
+            If the result has neither.
+        """
         if "forced_response" in self.data.children:
             return _peaks(self.data["forced_response"].to_dataset())
-        name = next((n for n in ("modes", "safe") if n in self.data.children), None)
-        return _frequencies(self.data[name].to_dataset()) if name else pd.DataFrame()
+        name = next((n for n in WITH_PEAKS if n in self.data.children), None)
+        if name is None:
+            own = ", ".join(f"result.to_dataframe({one!r})" for one in self)
+            raise input_error(
+                "result.peaks",
+                f"is of a forced response or of modes; this result has {', '.join(self)}",
+                f"Take {own}.",
+            )
+        return _frequencies(self.data[name].to_dataset())
 
     @property
     def measured(self) -> pd.DataFrame:
@@ -263,7 +278,8 @@ class Result:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
+        has = any(name in self.data.children for name in WITH_PEAKS)
+        return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_() if has else ''}"
 
 
 def result_of(outcome: Outcome) -> Result:

@@ -7,7 +7,7 @@ import pandas as pd
 import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
-from stickslip.study.coordinates import as_stored
+from stickslip.study.coordinates import VARIED_KEY, as_stored
 from stickslip.study.varied import varied_values
 
 
@@ -50,6 +50,11 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     InputError
         If there is no such variable.
     """
+    short = {
+        str(data[c].attrs[VARIED_KEY]): str(c)
+        for c in sorted(data.coords, key=str, reverse=True)
+        if VARIED_KEY in data[c].attrs
+    }
     data = as_stored(data)
     names = [str(v) for v in data.data_vars]
     if of and of not in names:
@@ -77,7 +82,7 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     if case is not None and "vary" in data.coords:
         keys, values = varied_values(data)
         for k, key in reversed(list(enumerate(keys))):
-            frame.insert(0, key, values[case, k])
+            frame.insert(0, short.get(key, key), values[case, k])
     for v in own.data_vars:  # numbers that stand for words
         told = own[v].attrs
         if "flag_meanings" in told:

@@ -21,7 +21,7 @@ from stickslip.assembly.sides.mistuning import Mistuning
 from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, stages_of, with_joins
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, joined_displacements, static_state
-from stickslip.contact.law import held_stiffness
+from stickslip.contact.law import check_law_members, held_stiffness
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
@@ -122,6 +122,8 @@ class Model:
     def __post_init__(self) -> None:
         if not self.parts:
             raise input_error("part", "there is none", "Give a model at least one part.")
+        for name, contact in self.contacts.items():
+            check_law_members(f"contact.{name}.law", contact.law)
         for name, one in (("aero", self.aerodynamics), ("mistuning", self.mistuning)):
             if one is None:
                 continue

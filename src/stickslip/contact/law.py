@@ -6,7 +6,7 @@ signature, and takes the step as a first-class function; a law of a user's scrip
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -56,7 +56,42 @@ class ContactLaw(Protocol):
         ...
 
 
+MEMBERS = ("kernel", "pairs", "parameters", "initial_state", "stuck_stiffness")  # of a law
+
 Law = TypeVar("Law", bound=ContactLaw)
+
+
+def check_law_members(place: str, law: object) -> None:
+    """Refuse what is no contact law, before any computation.
+
+    Parameters
+    ----------
+    place
+        Name of the contact's law, for the message.
+    law
+        The object.
+
+    Raises
+    ------
+    InputError
+        If it is a class or no dataclass, or lacks a member.
+    """
+    name = law.__name__ if isinstance(law, type) else type(law).__name__
+    if isinstance(law, type):
+        raise input_error(place, f"is the class {name}", f"Make one: {name}(...), with its parameters.")
+    if isinstance(law, str):
+        raise input_error(
+            place, f"is the text {law!r}", "Give a law with its parameters: stickslip.Jenkins(k_t=2e4, limit=2.0)."
+        )
+    known = dir(law)  # to read a kernel is to compile it
+    lacking = [] if isinstance(law, Rigid) else [member for member in MEMBERS if member not in known]
+    if lacking:
+        remedy = "docs/extending.md shows a law; stickslip.contact.check_law tries one."
+        raise input_error(place, f"is a {name}, which has no {', '.join(lacking)}", remedy)
+    if not is_dataclass(law):
+        raise input_error(
+            place, f"is a {name}, which is no dataclass", "Write @dataclass(frozen=True) above its class."
+        )
 
 
 def scaled(law: Law, factor: float) -> Law:

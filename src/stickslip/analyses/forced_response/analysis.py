@@ -58,7 +58,7 @@ from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import named
-from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.selection.strategy import always_kept, judged
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.by_shooting import shooting_response
 from stickslip.response.forced.choices import Stage
@@ -273,7 +273,7 @@ def _compile(question: Question) -> None:
         x = bonded_start(problem.low, omega, system)
         problem.low.linearise(x, omega)
         if always_kept(problem.strategy) is None:
-            problem.strategy.judge(problem.step(problem.low, x, omega))
+            judged(problem.strategy, problem.step(problem.low, x, omega))
     except NO_SOLUTION:
         return  # the response says what is wrong
     seconds = perf_counter() - start

@@ -36,7 +36,8 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
 
 def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]) -> Iterator[ModeRecord]:
     """Yield the missing points of one mode, and its end."""
-    end, problem, resonant, other = "", "", (), np.nan
+    resonant: tuple[int, ...] = ()
+    end, problem, other = "", "", np.nan
     every = [r.followed for r in done]
     try:
         way = mode_way(

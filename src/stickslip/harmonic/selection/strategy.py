@@ -6,16 +6,19 @@ response with few harmonics is finished first and only the frequencies that need
 which each frequency is settled, and the harmonics of the next one are chosen, before going on.
 """
 
+import numbers
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.event_integrals import Events
-from stickslip.errors import input_error
+from stickslip.errors import StickslipError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.harmonic_set import ByDof, Harmonics, of_all
 from stickslip.harmonic.structured import StructuredJacobian
@@ -260,6 +263,12 @@ def always_kept(strategy: Strategy) -> Kept | None:
     return kept
 
 
+MEANT = {
+    "threshold": "Give it the indicator above which more harmonics are asked for, as a number.",
+    "verifies": "True: a verdict says how good the solution itself is.",
+}
+
+
 def check_strategy(strategy: object) -> None:
     """Refuse an invalid strategy, before any long computation.
 
@@ -272,18 +281,23 @@ def check_strategy(strategy: object) -> None:
     if isinstance(strategy, type):
         raise input_error("Sweep.selection", f"is the class {name}", f"Make one: {name}().")
     if not callable(getattr(strategy, "judge", None)):
-        raise input_error("Sweep.selection", f"is a {name}, which has no method judge", "Give a name or a Strategy.")
-    threshold = getattr(strategy, "threshold", None)
+        raise input_error(
+            "Sweep.selection",
+            f"is a {name}, which has no method judge",
+            "Give it judge(self, step) -> Verdict, or a name.",
+        )
+    for member in ("threshold", "verifies"):
+        if not hasattr(strategy, member):
+            raise input_error(f"{name}.{member}", "is missing", MEANT[member])
+    threshold = strategy.threshold  # type: ignore[attr-defined]  # just looked for
     if not isinstance(threshold, (int, float)) or np.isnan(threshold):
         raise input_error(
             f"{name}.threshold",
             f"is {threshold!r}",
-            "Give it the indicator above which more harmonics are asked for, as a number.",
+            MEANT["threshold"],
         )
-    if not isinstance(getattr(strategy, "verifies", None), bool):
-        raise input_error(
-            f"{name}.verifies", "is neither True nor False", "True: a verdict says how good the solution itself is."
-        )
+    if not isinstance(strategy.verifies, bool):  # type: ignore[attr-defined]  # just looked for
+        raise input_error(f"{name}.verifies", "is neither True nor False", MEANT["verifies"])
 
 
 def judged(strategy: Strategy, step: Step) -> Verdict:
@@ -292,10 +306,12 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
     Raises
     ------
     InputError
-        If the strategy returns no `Verdict`, or asks for harmonics that the reference does not have.
+        If the strategy returns no `Verdict`, or asks for harmonics that the reference does not have; if one that is not of this package
+        raises anything, or returns an indicator that is no finite number.
     """
-    verdict: object = strategy.judge(step)
     place = f"{type(strategy).__name__}.judge"
+    own = type(strategy).__module__.partition(".")[0] != __name__.partition(".")[0]
+    verdict: object = _of_a_user(strategy, step, place) if own else strategy.judge(step)
     if not isinstance(verdict, Verdict):
         raise input_error(place, f"returned a {type(verdict).__name__}", "Return a Verdict.")
     each = of_all((verdict.again_by_dof or ()) + (verdict.following_by_dof or ()))
@@ -306,4 +322,24 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
             f"asks for harmonics {', '.join(map(str, sorted(beyond)))}, which the reference does not have",
             "Keep to step.reference.harmonics, or raise Sweep.high.",
         )
+    if own and not (isinstance(verdict.indicator, numbers.Real) and np.isfinite(float(verdict.indicator))):
+        raise input_error(
+            place,
+            f"returned the indicator {verdict.indicator!r}",
+            f"Return a finite number: above the threshold, {strategy.threshold:g}, it asks for more harmonics.",
+        )
     return verdict
+
+
+def _of_a_user(strategy: Strategy, step: Step, place: str) -> object:
+    """Return what the `judge` of a user's strategy returns; whatever it raises names it, with the line."""
+    try:
+        return strategy.judge(step)
+    except StickslipError:
+        raise
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)[1:]
+        home = str(Path(__file__).parents[2])
+        line = next((f for f in reversed(frames) if "site-packages" not in f.filename and home not in f.filename), None)
+        remedy = f"See {Path(line.filename).name}, line {line.lineno}." if line else "Let it take (self, step)."
+        raise input_error(place, f"raises {type(error).__name__}: {error}", remedy) from error

@@ -56,6 +56,10 @@ def draw(figure: go.Figure, name: str, ax: Any = None, width: float | None = Non
     if ax is None:
         return _new(figure, found, width)
     given = list(ax.flat) if hasattr(ax, "flat") else list(ax) if isinstance(ax, Sequence) else [ax]
+    wrong = next((one for one in given if not _is_axes(one)), None)
+    if wrong is not None:
+        remedy = f"Give {_count(len(found))} of matplotlib: `figure, ax = plt.subplots()` makes them, or `figure.add_subplot()`."
+        raise input_error(f"plot({name!r}, ax=…)", f"holds a {type(wrong).__name__}", remedy)
     if len(given) != len(found):
         remedy = f"Give {_count(len(found))}, in the order of reading: `plt.subplots` makes them. Or leave `ax` out."
         raise input_error(f"plot({name!r}, ax=…)", f"has {_count(len(given))}", remedy)
@@ -64,6 +68,12 @@ def draw(figure: go.Figure, name: str, ax: Any = None, width: float | None = Non
     if len(texts) > 1:
         given[0].legend(artists, texts, title=title or None)
     return ax
+
+
+def _is_axes(one: object) -> bool:
+    from matplotlib.axes import Axes
+
+    return isinstance(one, Axes)
 
 
 def _count(n: int) -> str:

@@ -30,7 +30,8 @@ def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo)
     if is_address(given):
         own_object(info, given, "strategy", MEMBERS, instance=True)
         return given
-    return given if hasattr(given, "judge") else check(given)
+    plain = given is None or isinstance(given, str | int | float | list | dict)
+    return check(given) if plain else given  # what an object lacks is said by `check_strategy`
 
 
 Selection: Any = Annotated[Literal[SELECTIONS], WrapValidator(_named_or_own)]

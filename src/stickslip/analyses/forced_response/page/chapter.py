@@ -98,6 +98,10 @@ def _size(response: Response, case: ShownCase) -> str:
     return amplitude(response.peak_response(case) * (case.excitation if response.per_force else 1.0), response.length)
 
 
+# a study's key; a model in Python is answered once for each variant
+VARY = "[vary] of a study file, or in Python stickslip.compare of several models made by dataclasses.replace"
+
+
 def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
     """Return what to do next: settle a doubt, sweep farther, compute beyond the last value, or between the neighbours."""
     if response.trust(best):
@@ -108,7 +112,7 @@ def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
         return ["Next: press the contacts less or excite more, until they slip"]
     key = first_number(response.data)[0]
     if not key:
-        return [] if len(response.cases) > 1 else ["Next: vary the load or the damper with [vary]"]
+        return [] if len(response.cases) > 1 else [f"Next: vary the load or the damper: {VARY}"]
     family = next(own for own in families_of(response.data, key, response.peaked).values() if best in own)
     at = family.index(best)
     if at in (0, len(family) - 1):

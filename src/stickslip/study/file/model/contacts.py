@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from stickslip.assembly.contact import GROUND, NEXT, SPATIAL, PairingKind, Share
-from stickslip.contact.law import ContactLaw
+from stickslip.contact.law import MEMBERS, ContactLaw
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import InputError, did_you_mean
@@ -50,7 +50,6 @@ def _known_kind(given: Any) -> Any:
 
 
 PopulationTable: Any = Annotated[union_of(_TABLES, _kind), BeforeValidator(_known_kind)]
-MEMBERS = ("kernel", "pairs", "parameters", "initial_state", "stuck_stiffness")  # of a law
 
 
 def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
