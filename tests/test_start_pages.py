@@ -58,9 +58,10 @@ def test_researcher(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert rows["guarded_alert"] == "400 1.648 mm"
     assert rows["always_high"] == "660 1.648 mm"
     own = re.findall(r"^(\w+): (\d+) unknowns, ([\d.]+) mm$", said, flags=re.MULTILINE)
-    assert [(kind, peak) for kind, _, peak in own] == [("str", "1.648"), ("Unbalanced", "1.648"), ("str", "1.648")]
-    assert int(own[1][1]) < int(own[2][1])
-    assert {p.name for p in tmp_path.iterdir()} >= {"response.html", "strategies.html", "curve.csv"}
+    assert [(kind, peak) for kind, _, peak in own] == [("Unbalanced", "1.648")]
+    assert int(own[0][1]) < 660
+    pages = {"response.html", "strategies.html", "mine.html", "with_mine.html", "curve.csv"}
+    assert {p.name for p in tmp_path.iterdir()} >= pages
 
 
 def test_designer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
