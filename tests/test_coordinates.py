@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from synthetic_result import KEY, synthetic_result, tree_of
+from synthetic_wheel import campbell_result, modes_result, safe_result
 
 import stickslip as ss
 from stickslip.study.coordinates import as_stored, selectable, short_names, with_coordinates
@@ -132,3 +133,31 @@ def test_outputs_get_their_names_where_all_cases_have_the_same() -> None:
     assert with_coordinates(data, "run_up").amplitude.sel(output="b").values.tolist() == [0, 1]
     data["output_label"][1] = ["b", "a"]
     assert "output" not in with_coordinates(data, "run_up").coords
+
+
+@pytest.mark.parametrize("cases", [1, 2])
+def test_modes_are_taken_by_nodal_diameter_and_pairs_by_engine_order(cases: int) -> None:
+    made = {"modes": modes_result(), "campbell": campbell_result(), "safe": safe_result()}
+    each = {n: xr.concat([d] * cases, "case", data_vars="all") for n, d in made.items()}
+    for name, data in each.items():
+        found = selectable(with_coordinates(data, name))
+        at = int(np.flatnonzero(data.nodal_diameter.values[0] == 3)[0])
+        for one in (found.sel(nodal_diameter=3), found.sel(wave_number=[3])):
+            np.testing.assert_array_equal(one.frequency_hz.values, data.frequency_hz.values[:, [at]])
+        assert found.sel(wave_kind="forward").sizes["wave"] == np.sum(data.wave_kind.values[0] == "forward")
+        with pytest.raises(KeyError, match="nodal_diameter has no value 77"):
+            found.sel(nodal_diameter=77)
+        # the file keeps its variables
+        assert with_coordinates(data, name).reset_coords().nodal_diameter.identical(data.nodal_diameter)
+    pairs = selectable(with_coordinates(each["safe"], "safe")).sel(pair_engine_order=5)
+    assert set(pairs.pair_engine_order.values.ravel().tolist()) == {5}
+    orders = selectable(with_coordinates(each["campbell"], "campbell")).sel(engine_orders=5)
+    assert orders.sizes["order"] == 1
+
+
+def test_labels_that_differ_between_cases_stay_with_their_cases() -> None:
+    data = xr.concat([modes_result()] * 2, "case", data_vars="all").copy(deep=True)
+    data["nodal_diameter"].values[1] += 1
+    found = selectable(with_coordinates(data, "modes"))
+    assert found.nodal_diameter.dims == ("case", "wave")
+    assert found.wave_number.dims == ("wave",)

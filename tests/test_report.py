@@ -25,7 +25,7 @@ from stickslip.analyses.forced_response.page.errors import errors
 from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics, more_harmonics
 from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
-from stickslip.analyses.inputs import Varied, as_run, told
+from stickslip.analyses.inputs import Varied, as_run, inputs, told
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures.model import reduction
 from stickslip.analyses.pictures.skin import edges, skin_picture
@@ -1010,3 +1010,25 @@ def test_the_page_of_a_python_model_tells_its_loads(tmp_path: Path) -> None:
     assert "slip limit 200 mN" in text
     assert "frequency 0.1 to 0.3 Hz" in text
     assert "shaker.xmotion along x of node set or dof blade.m1" in text
+
+
+def test_every_table_of_a_study_has_a_row_with_its_keys() -> None:
+    study = {
+        "title": "a wheel",
+        "part": {"blade": {"file": "fan.inp", "units": "mm-t-s"}},
+        "contact": {"strip": {"between": ["blade.A", "next.blade.B"], "normal_stiffness_n_per_m": 5e7}},
+        "rotation": {"speed_rpm": 8000.0},
+        "modes": {"number": 5, "contacts": "open"},
+        "campbell": {"speeds_rpm": [4000.0, 9000.0], "engine_orders": [4, 13]},
+        "vary": {"modes.number": [5, 6]},
+    }
+    (table,) = inputs(study, {})
+    rows = {name: text.replace("\u202f", "") for name, text in table.rows}
+    assert rows == {
+        "part blade": "fan.inp; units mm-t-s",
+        "contact strip": "between blade.A, next.blade.B; normal stiffness 50 MN/m",
+        "rotation": "speed 8000 rpm",
+        "modes": "number 5, 6 (varied); contacts open",
+        "campbell": "speeds 4000 to 9000 rpm; engine orders 4, 13",
+        "cases: modes.number": "5, 6",
+    }

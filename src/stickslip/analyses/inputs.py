@@ -33,8 +33,6 @@ _UNITS = (
     ("m", "m", True),
     ("s", "s", True),
 )
-_SETTINGS = ("material", "damping", "rotation", "retention", "aero", "mistuning", "measured")
-_QUESTIONS = {"frequency_hz", "speed_rpm", "points", "modes", "nodal_diameters", "levels", "span", "orders"}
 _BLADE = re.compile(r"\[(\d+)\]$")
 _FEW_NAMES, _MOST_NAMES = 4, 24
 _ENDS = 2  # numbers of a range
@@ -59,10 +57,15 @@ def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
     nodes
         Nodes of the analyses by name.
     """
-    response = next((n for n in nodes.values() if isinstance(n, Response)), None)
+    response = _response(nodes)
     study = as_run(study)
     found = (_given(study, nodes), _contacts(study, response), _names(study, nodes))
     return [table for table in found if table is not None]
+
+
+def _response(nodes: Mapping[str, Node]) -> Response | None:
+    """Return the node with contacts and outputs, which have tables of their own."""
+    return next((n for n in nodes.values() if isinstance(n, Response)), None)
 
 
 @dataclass(frozen=True)
@@ -151,25 +154,38 @@ def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any
 def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
     rows = [[f"part {name}", _part(own)] for name, own in _table(study, "part").items() if isinstance(own, dict)]
     rows += [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]
-    for name in _SETTINGS:
-        own = _table(study, name)
-        if own:
-            rows.append([name, "; ".join(told(key, value) for key, value in _flat(own))])
-    for name in nodes:
-        own = {k: v for k, v in _table(study, name).items() if k in _QUESTIONS}
-        if own:
-            rows.append([name.replace("_", " "), "; ".join(told(k, v) for k, v in own.items())])
+    elsewhere = {"part", "load", "vary"} | ({"contact", "output"} if _response(nodes) else set())
+    for name in study:
+        rows += [] if name in elsewhere else _rows(name, study[name])
     varied = study.get("vary", {})
     for own in varied if isinstance(varied, list) else [varied]:
         rows += [[f"cases: {key}", _plain(v)] for key, v in _flat(own if isinstance(own, dict) else {})]
-    return Table((), rows, "Loads, damping, cases", numeric=False) if rows else None
+    return Table((), rows, "Tables of the study", numeric=False) if rows else None
+
+
+def _rows(name: str, given: Any) -> list[list[str]]:
+    """Return a row for a table of the study, or one for each of the named tables in it; none for a plain value or an empty table."""
+    words = name.replace("_", " ")
+    if isinstance(given, list):
+        each = [own for own in given if isinstance(own, dict)]
+        return [row for k, own in enumerate(each, 1) for row in _rows(f"{name} {k}" if len(each) > 1 else name, own)]
+    if not isinstance(given, dict) or not given:
+        return []
+    if all(isinstance(own, dict) for own in given.values()):
+        return [[f"{words} {key}", _keys(own)] for key, own in given.items() if own]
+    return [[words, _keys(given)]]
+
+
+def _keys(given: Mapping[str, Any]) -> str:
+    """Return all keys of a table in words."""
+    return "; ".join(told(key, value) for key, value in _flat(given))
 
 
 def _part(own: Mapping[str, Any]) -> str:
-    """Describe material and damping of a part."""
-    kind = own.get("shape") or own.get("file") or own.get("of") or "matrices"
-    words = ("damp", "dashpot", "sectors", "mass_kg", "material")
-    rest = [told(k, v) for k, v in _flat(own) if k.startswith(words)]
+    """Return the kind of a part, and its other keys in words."""
+    of = next((key for key in ("shape", "file", "of") if own.get(key)), "")
+    kind = own[of] if of else "matrices"
+    rest = [told(k, v) for k, v in _flat(own) if k != of]
     return "; ".join([_plain(kind), *rest])
 
 

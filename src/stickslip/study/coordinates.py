@@ -168,7 +168,8 @@ def with_coordinates(data: xr.Dataset, analysis: str) -> xr.Dataset:
 
 
 def selectable(data: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in which `sel` takes values of the varied keys, which `with_coordinates` made coordinates."""
+    """Return a dataset in which `sel` takes values of the varied keys, and of labels such as nodal diameters, which `with_coordinates` made coordinates."""
+    data = _with_labels(data)
     keys = [name for name in data.coords if VARIED_KEY in data[name].attrs]
     for dim in dict.fromkeys(data[name].dims[0] for name in keys):
         own = {name: data[name].variable for name in keys if data[name].dims == (dim,)}
@@ -176,6 +177,23 @@ def selectable(data: xr.Dataset) -> xr.Dataset:
         found = {dim: here.to_base_variable(), **own}
         index = Varied.from_variables(found, options={})
         data = data.drop_indexes(dim, errors="ignore").assign_coords(xr.Coordinates(found, dict.fromkeys(found, index)))
+    return data
+
+
+def _with_labels(data: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose labels of rows (whole numbers and words) that all cases share are coordinates of their rows alone, with an index."""
+    found: dict[Hashable, dict[Hashable, xr.Variable]] = {}
+    for name in data.coords:
+        own = data[name].variable
+        if own.dims[:1] != (CASE,) or own.ndim != 2 or own.dtype.kind not in "iU" or not own.size:
+            continue
+        if (own.values == own.values[:1]).all():
+            found.setdefault(own.dims[1], {})[name] = xr.Variable(own.dims[1:], own.values[0], own.attrs)
+    for dim, labels in found.items():
+        if dim not in data.variables:
+            every = {dim: xr.Variable((dim,), np.arange(data.sizes[dim])), **labels}
+            index = Varied.from_variables(every, options={})
+            data = data.drop_vars(labels).assign_coords(xr.Coordinates(every, dict.fromkeys(every, index)))
     return data
 
 

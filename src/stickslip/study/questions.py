@@ -43,10 +43,13 @@ def _folder(name: str, analysis: str, table: str, page: str = "page", axes: tupl
     return Home(f"{own}.analysis:{analysis}", f"{own}.table:{table}", f"{own}.{page}:SECTION", axes)
 
 
+_WAVE = ("nodal_diameter", "wave_number", "wave_kind")  # of the waves of an analysis of small vibrations
+
+
 def _waves(name: str, table: str, axes: tuple[str, ...] = ()) -> Home:
     """Return the addresses of an analysis of small vibrations by waves."""
     own = "stickslip.analyses.waves"
-    return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION", axes)
+    return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION", (*_WAVE, *axes))
 
 
 # names of the variables that position the entries of a dataset
@@ -64,8 +67,8 @@ ANALYSES = {
     "all_motions": _folder("all_motions", "ALL_MOTIONS", "AllMotionsTable", axes=("frequency_hz", "searched_hz")),
     "residual_tractions": _folder("residual_tractions", "RESIDUAL_TRACTIONS", "ResidualTractionsTable", axes=_HZ),
     "modes": _waves("modes", "ModesTable"),
-    "campbell": _waves("campbell", "CampbellTable", axes=("speed_rpm",)),
+    "campbell": _waves("campbell", "CampbellTable", axes=("speed_rpm", "engine_orders", "crossing_engine_order")),
     "flutter": _waves("flutter", "FlutterTable"),
-    "safe": _waves("safe", "SafeTable"),
+    "safe": _waves("safe", "SafeTable", axes=("pair_engine_order",)),
     "run_up": _folder("run_up", "RUN_UP", "RunUpTable", axes=_RUN_UP),
 }
