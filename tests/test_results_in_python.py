@@ -10,6 +10,7 @@ from synthetic_result import KEY, synthetic_result, tree_of
 import stickslip as ss
 from stickslip.analyses.forced_response.records.columns import flags
 from stickslip.study.analysis import named
+from stickslip.study.coordinates import with_coordinates
 
 
 def test_a_response_is_a_row_a_point_and_output() -> None:
@@ -17,6 +18,9 @@ def test_a_response_is_a_row_a_point_and_output() -> None:
     frame = ss.Result(tree_of(forced_response=data)).to_dataframe()
     assert len(frame) == data.sizes["point"] * data.sizes["output"]
     assert frame[KEY].dtype.kind == "f"
+    named_alike = ss.Result(tree_of(forced_response=with_coordinates(data, "forced_response"))).to_dataframe()
+    assert KEY not in named_alike  # the dataset's coordinate is called so, too
+    np.testing.assert_array_equal(named_alike["ratio"], frame[KEY])
     one = frame[(frame[KEY] == 5) & (frame["output"] == str(data["output"].values[1]))]
     at = data["point_case"].values == 1
     np.testing.assert_array_equal(one["frequency_hz"], data["frequency_hz"].values[at])

@@ -52,7 +52,7 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     """
     short = {
         str(data[c].attrs[VARIED_KEY]): str(c)
-        for c in sorted(data.coords, key=str, reverse=True)
+        for c in sorted(data.coords, key=lambda c: -len(str(c)))  # that of the points last, without case_
         if VARIED_KEY in data[c].attrs
     }
     data = as_stored(data)

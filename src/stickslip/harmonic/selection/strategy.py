@@ -322,10 +322,11 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
             f"asks for harmonics {', '.join(map(str, sorted(beyond)))}, which the reference does not have",
             "Keep to step.reference.harmonics, or raise Sweep.high.",
         )
-    if own and not (isinstance(verdict.indicator, numbers.Real) and np.isfinite(float(verdict.indicator))):
+    indicator: object = verdict.indicator
+    if own and not (isinstance(indicator, numbers.Real) and np.isfinite(float(indicator))):
         raise input_error(
             place,
-            f"returned the indicator {verdict.indicator!r}",
+            f"returned the indicator {indicator!r}",
             f"Return a finite number: above the threshold, {strategy.threshold:g}, it asks for more harmonics.",
         )
     return verdict
