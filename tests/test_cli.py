@@ -361,7 +361,7 @@ def test_a_deck_from_inspect_to_modes(tmp_path: Path) -> None:
 def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(tmp_path: Path) -> None:
     path = write_example_deck(tmp_path)
     said = done("run", str(path))
-    for table in ("Forced response", "Natural frequencies in Hz", "Crossings", "near resonances"):
+    for table in ("Forced response", "Natural frequencies in Hz", "Crossings", "near resonance"):
         assert table in said
     with xr.open_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf") as tree:
         assert set(tree.children) == {"forced_response", "modes", "campbell", "safe"}
