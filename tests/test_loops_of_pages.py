@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from synthetic_result import provenance, synthetic_result, tree_of
 
+from stickslip.analyses.forced_response.page.at_peak.contacts import SHOWN_LOOPS, hysteresis_t
 from stickslip.analyses.forced_response.page.chapter import peaks
-from stickslip.analyses.forced_response.page.contacts import SHOWN_LOOPS, hysteresis_t
 from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import MOTION

@@ -8,7 +8,7 @@ import xarray as xr
 from browser import CHROMIUM, Browser
 from synthetic_result import box, parts, provenance, synthetic_result, tree_of
 
-from stickslip.analyses.forced_response.page.motion import MOST_BYTES, in_motion, motion_of_case
+from stickslip.analyses.forced_response.page.at_peak.motion import MOST_BYTES, in_motion, motion_of_case
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.page import report_html
 from stickslip.arrays import FloatArray

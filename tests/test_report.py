@@ -16,10 +16,10 @@ from browser import CHROMIUM, Browser
 from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
-from stickslip.analyses.forced_response.page.bodies import body_motion, rigid_bodies
+from stickslip.analyses.forced_response.page.at_peak.bodies import body_motion, rigid_bodies
+from stickslip.analyses.forced_response.page.at_peak.contacts import hysteresis_t
 from stickslip.analyses.forced_response.page.chapter import cards, peaks
 from stickslip.analyses.forced_response.page.checks import stability, statistics_in_time, time_integration
-from stickslip.analyses.forced_response.page.contacts import hysteresis_t
 from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.errors import errors
 from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics, more_harmonics

@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.bodies import group_colours, rigid_bodies
-from stickslip.analyses.forced_response.page.contacts import contact_lines, states
+from stickslip.analyses.forced_response.page.at_peak.bodies import group_colours, rigid_bodies
+from stickslip.analyses.forced_response.page.at_peak.contacts import contact_lines, states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Drawn, read
 from stickslip.arrays import FloatArray, IntArray

@@ -2,8 +2,17 @@
 
 import numpy as np
 
+from stickslip.analyses.forced_response.page.at_peak.bodies import bodies, energy
+from stickslip.analyses.forced_response.page.at_peak.contacts import (
+    chosen_case,
+    hysteresis_t,
+    hysteresis_w,
+    state_map,
+    surface_map,
+)
+from stickslip.analyses.forced_response.page.at_peak.friction_ratio import friction_ratio_t, friction_ratio_w
+from stickslip.analyses.forced_response.page.at_peak.motion import in_motion
 from stickslip.analyses.forced_response.page.bifurcations import bifurcations
-from stickslip.analyses.forced_response.page.bodies import bodies, energy
 from stickslip.analyses.forced_response.page.checks import (
     amplitudes_in_time,
     retention,
@@ -12,19 +21,10 @@ from stickslip.analyses.forced_response.page.checks import (
     statistics_in_time,
     time_integration,
 )
-from stickslip.analyses.forced_response.page.contacts import (
-    chosen_case,
-    hysteresis_t,
-    hysteresis_w,
-    state_map,
-    surface_map,
-)
 from stickslip.analyses.forced_response.page.curves import abscissa, frequency_response, low_order, of_each_order
 from stickslip.analyses.forced_response.page.errors import error_scatter, errors
-from stickslip.analyses.forced_response.page.friction_ratio import friction_ratio_t, friction_ratio_w
 from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
-from stickslip.analyses.forced_response.page.motion import in_motion
 from stickslip.analyses.forced_response.page.optimisation import optimisation, what_is_needed, where_friction_works
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.forced_response.page.wheel import (

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.contacts import states
+from stickslip.analyses.forced_response.page.at_peak.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Attempts, MoreHarmonics, read
 from stickslip.analyses.forced_response.summary import cost_sentence

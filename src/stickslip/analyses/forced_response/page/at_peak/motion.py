@@ -10,8 +10,8 @@ import numpy.typing as npt
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from stickslip.analyses.forced_response.page.bodies import group_colours
-from stickslip.analyses.forced_response.page.contacts import states
+from stickslip.analyses.forced_response.page.at_peak.bodies import group_colours
+from stickslip.analyses.forced_response.page.at_peak.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Drawn, read
 from stickslip.analyses.pictures.skin import BODY, EDGES, STEEL, edges, segments, space, surface

@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.analyses.forced_response.page.contacts import drawn_samples, state_keys
+from stickslip.analyses.forced_response.page.at_peak.contacts import drawn_samples, state_keys
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
