@@ -681,7 +681,7 @@ def test_optimisation_follows_the_first_varied_number_one_curve_for_each_other_v
     data = data.assign_coords(vary=["contact.flat.law", "contact.flat.friction_coefficient"])
     drawn = optimisation(Response(data))
     assert drawn is not None
-    assert drawn.figure.layout.xaxis2.title.text == "contact.flat.friction_coefficient"
+    assert drawn.figure.layout.xaxis2.title.text == "friction coefficient"
     left = [t for t in drawn.figure.data if t.xaxis == "x"]
     assert [t.name for t in left] == ["contact.flat.law = stiff", "contact.flat.law = soft"]
     assert all(list(t.x) == [0.2, 0.4, 0.6] for t in left)

@@ -315,7 +315,7 @@ def frequency_response(response: Response) -> Plot | None:
             figure.add_trace(key_marker(word, symbol, "key"))
     _, name, unit = abscissa(response)
     rows = -(-len(shown) // (2 if len(shown) <= 4 else 3)) if len(shown) > 1 else 1
-    height = max(500, 150 + 210 * rows)
+    height = max(480, 150 + 210 * rows)
     styled(figure, height)
     buttons = _scale_buttons(logarithmic=True)
     if len(shown) > 1:  # above the titles of panels
