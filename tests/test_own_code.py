@@ -328,9 +328,10 @@ def test_what_is_wrong_is_refused_by_name(tmp_path: Path, change: tuple[str, str
 def test_an_error_in_the_code_is_no_fault_of_the_package(tmp_path: Path) -> None:
     study = write(tmp_path, chosen("mine:FAILING"))
     done = invoke("run", study, "--allow-code")
-    assert done.exit_code == 1
+    assert done.exit_code == 2
     line = next(n for n, text in enumerate(STRATEGY.splitlines(), 1) if "KeyError" in text)
-    assert f"mine.py, line {line}: KeyError: 'harmonic 7'. Correct your code" in said(done)
+    assert "Asking.judge: raises KeyError: 'harmonic 7'." in said(done)
+    assert f"See mine.py, line {line}." in said(done)
 
 
 def test_parameters_of_a_law_are_refused_by_name(tmp_path: Path) -> None:
