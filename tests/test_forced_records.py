@@ -18,7 +18,11 @@ from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.not_periodic import Answer, of_answers
 from stickslip.units import HZ
 
-ONCE = ("peak_frequency_hz", "unstable_peak_frequency_hz")  # frequencies of a case, not of rows
+ONCE = (
+    "peak_frequency_hz",
+    "unstable_peak_frequency_hz",
+    "neglected_frequency_hz",
+)  # frequencies of a case, not of rows
 
 
 def check(found: dict[str, Any], **expected: Any) -> None:

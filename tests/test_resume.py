@@ -21,7 +21,7 @@ SECONDS = 120.0
 # two tables multiply; modes do not depend on the load's case
 SLIPPING = {"vary.load.shaker.force_n": "[5.0, 8.0]", "modes.number": "3"}
 # a user's interrupt before harmonics are raised, a lost machine after some were raised, audited and lowered
-STOPS = {signal.SIGINT: "  point 6:", signal.SIGKILL: "  point 22:"}
+STOPS = {signal.SIGINT: " point 6:", signal.SIGKILL: " point 22:"}
 SCRIPT = """
 import logging, signal, sys
 from pathlib import Path
@@ -55,7 +55,7 @@ def stopped(study: Path, how: signal.Signals, workers: int) -> tuple[int, str]:
         assert process.stdout is not None
         assert process.stderr is not None
         for line in process.stdout:
-            if line.startswith(STOPS[how]):
+            if STOPS[how] in line:
                 process.send_signal(how)
                 break
         process.stdout.read()

@@ -51,7 +51,7 @@ class Scene:
     supports
         (s, 3) points that are held.
     moving
-        Recovery of the motion; None for models that are too large, and for wheels whose sectors differ.
+        Recovery of the motion; None for models that are too large.
     """
 
     points: FloatArray
@@ -151,7 +151,7 @@ def scene_of(model: Model, harmonics: int) -> Scene:
 
 def _moving(model: Model, harmonics: int, rows: Matrix, points: int) -> Moving | None:
     """Reduce a model again, and return the recovery of the motion of its picture; None where that is not done."""
-    if model.mistuning is not None or model.places.n > MOST_DOFS or not rows.shape[0]:
+    if model.places.n > MOST_DOFS or not rows.shape[0]:
         return None
     wheel = model.sectors > 1
     most = max(h for h in (1, *model.driven.values()))

@@ -271,7 +271,9 @@ def with_comparisons(question: Question, case: Case, model: Model) -> Question:
     more = more_modes(model, order, case.store)
     more = None if more is None else peak_first(more)
     richer = None if more is None else (more.system, more.load)
-    return replace(question, richer=richer, extent=extent_of(model, order), scene=scene_of(model, order))
+    # pictures have one sector, contacts of a mistuned wheel are those of all sectors
+    scene = scene_of(model, order) if model.mistuning is None else None
+    return replace(question, richer=richer, extent=extent_of(model, order), scene=scene)
 
 
 def question_of(case: Case, model: Model) -> Question:

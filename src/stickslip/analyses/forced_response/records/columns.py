@@ -234,7 +234,7 @@ class ModelFacts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Drawn:
-    """What pictures show of the model, and its motion at the peak."""
+    """What pictures show of the model, and its motion at the peak; nothing of a wheel whose sectors differ."""
 
     drawn_point: FloatArray = column(
         "m",
@@ -260,7 +260,7 @@ class Drawn:
     )
     peak_drawn_motion: FloatArray = column(
         "m",
-        "displacement of the drawn points at the peak in the first harmonics from 1 on, without the mean; NaN where it was not recovered: above 60 000 degrees of freedom, for wheels whose sectors differ, without a peak",
+        "displacement of the drawn points at the peak in the first harmonics from 1 on, without the mean; NaN where it was not recovered: above 60 000 degrees of freedom, without a peak",
         along="case drawn_harmonic drawn_node xyz part",
     )
     peak_contact_motion: FloatArray = column(
