@@ -1,7 +1,5 @@
 """What a model says of arguments that it cannot use."""
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import plotly.graph_objects as go
 import pytest
@@ -68,14 +66,14 @@ def test_what_is_no_argument_is_refused_with_a_remedy(given: dict[str, object], 
 
 
 def test_a_figure_is_no_axes() -> None:
+    drawn = pytest.importorskip("matplotlib.figure")
     page = {"response": go.Figure(go.Scatter(x=[1.0, 2.0], y=[1.0, 3.0]))}
-    mpl.use("Agg")
-    figure, axes = plt.subplots()
+    figure = drawn.Figure()
+    axes = figure.add_subplot()
     for wrong, name in ((figure, "Figure"), ([3], "int")):
         with pytest.raises(ss.InputError, match=rf"ax=…\): holds a {name}\. Give one pair of axes of matplotlib"):
             plotted(page, "response", wrong, "matplotlib", None, "result")
     assert plotted(page, "response", axes, "matplotlib", None, "result") is axes
-    plt.close(figure)
 
 
 def test_peaks_of_a_result_without_any_name_the_table() -> None:
