@@ -96,6 +96,18 @@ def test_panels_hold_each_case_once_and_no_more_than_a_legend_tells_apart(forces
     assert len({t.xaxis or "x" for t in plot.figure.data}) == len(found)
 
 
+def test_cases_without_a_common_value_share_panels_in_their_order() -> None:
+    laws = [f"law {k}" for k in "abcdefghij"]
+    data = synthetic_result(ratios=tuple(np.geomspace(200, 2, 10)), n=12, verify=False).drop_vars(
+        ["vary", "vary_value"]
+    )
+    values = xr.Variable(("case", "vary"), np.array(laws, dtype=object)[:, None])
+    data = data.assign_coords(vary=["contact.flat.law"]).assign(vary_value=values, case_label=("case", laws))
+    found = panels(Response(data))
+    assert [p.title for p in found] == ["law a to law e", "law f to law j"]
+    assert [c.index for p in found for c in p.cases] == list(range(10))
+
+
 def test_of_more_cases_three_are_named_and_all_are_drawn() -> None:
     response = Response(grid(4, 10))
     assert len(response.cases) > MOST_IN_PANELS

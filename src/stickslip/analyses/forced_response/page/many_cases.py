@@ -58,9 +58,10 @@ def panels(response: Response) -> tuple[Panel, ...]:
     if len(cases) <= FEW:
         return (Panel("", cases, tuple(c.short for c in cases)),)
     key = first_number(response.data)[0]
-    found = [
-        _panel(name, part) for name, family in families_of(response.data, key, cases).items() for part in _parts(family)
-    ]
+    curves: Mapping[str, Sequence[ShownCase]] = families_of(response.data, key, cases)
+    if 2 * len(curves) > len(cases):  # texts, or values that do not recur: hardly two cases have anything in common
+        curves = {"": cases}
+    found = [_panel(name, part) for name, family in curves.items() for part in _parts(family)]
     return _coloured(found) if len(found) <= MOST_PANELS and len(cases) <= MOST_IN_PANELS else ()
 
 
@@ -149,14 +150,14 @@ def _map(
     response: Response, curves: Mapping[str, Sequence[ShownCase]], columns: Sequence[float], scale: Scale
 ) -> go.Figure:
     size = np.full((len(curves), len(columns)), np.nan)
+    marks = np.full(size.shape, "", dtype=object)
     told = np.full((*size.shape, 2), "", dtype=object)
     for row, curve in enumerate(curves.values()):
         for case in curve:
             at = row, columns.index(case.value)
             size[at] = response.peak_response(case) * scale.factor
+            marks[at] = "?" * bool(response.trust(case))
             told[at] = case.named, f"{response.place(case)}{f', {response.level(case)}' * bool(response.trust(case))}"
-    doubted = {(case.named) for curve in curves.values() for case in curve if response.trust(case)}
-    marks = np.vectorize(lambda name: "?" if name in doubted else "")(told[..., 0])
     texts = [
         [f"{number(float(v), 3)}{mark}" if np.isfinite(v) else "" for v, mark in zip(*row, strict=True)]
         for row in zip(size, marks, strict=True)
