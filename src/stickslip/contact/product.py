@@ -376,6 +376,21 @@ def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
     return left
 
 
+@njit(cache=True, nogil=True)
+def _add_stiffness(stiffness, columns, values, forces, out):  # type: ignore[no-untyped-def]
+    """Add ``Bᵀ k B`` of all contacts to `out` (n, n); `forces` (3, k) is the forces on one contact of unit coordinates."""
+    for c in range(columns.shape[0]):
+        for d in range(3):
+            for j in range(columns.shape[1]):
+                total = stiffness[c, d, 0] * values[c, 0, j]
+                total += stiffness[c, d, 1] * values[c, 1, j]
+                forces[d, j] = total + stiffness[c, d, 2] * values[c, 2, j]
+        for j in range(columns.shape[1]):
+            for i in range(columns.shape[1]):
+                own = values[c, 0, i] * forces[0, j] + values[c, 1, i] * forces[1, j] + values[c, 2, i] * forces[2, j]
+                out[columns[c, i], columns[c, j]] += own
+
+
 def add_stiffness(
     stiffness: FloatArray | ComplexArray, columns: IntArray, values: FloatArray, out: FloatArray | ComplexArray
 ) -> None:
@@ -390,6 +405,5 @@ def add_stiffness(
     out
         In and out: (n, n).
     """
-    local = values.transpose(0, 2, 1) @ stiffness @ values
-    rows = np.broadcast_to(columns[:, :, None], local.shape)
-    np.add.at(out, (rows, rows.transpose(0, 2, 1)), local)
+    forces = np.empty((3, columns.shape[1]), dtype=stiffness.dtype)
+    _add_stiffness(stiffness, columns, values, forces, out)

@@ -150,12 +150,15 @@ def _gaps_of_each(
     parts = np.zeros((2 * count, low.linear.n))
     rows.add_forces(np.concatenate([own.real, own.imag]), parts)
     pushed = parts[:count] + 1j * parts[count:]
-    if low.linear.n <= MAX_STACKED_ROWS and not isinstance(side, SparseProduct):
-        contacts = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
-        moved = _solved_together(np.array([side.block(h) for h in harmonics]) + contacts, pushed)
-    else:
+    if isinstance(side, SparseProduct):
         each = zip(harmonics, pushed, strict=True)
         moved = np.array([_solved(with_contacts(side.block(h), stiffness, rows), f) for h, f in each])
+    else:
+        contacts = with_contacts(np.zeros((low.linear.n, low.linear.n), dtype=complex, order="F"), stiffness, rows)
+        if low.linear.n <= MAX_STACKED_ROWS:
+            moved = _solved_together(np.array([side.block(h) for h in harmonics]) + contacts, pushed)
+        else:
+            moved = np.array([_solved(side.block(h) + contacts, f) for h, f in zip(harmonics, pushed, strict=True)])
     gaps = rows.gaps(np.concatenate([moved.real, moved.imag]))
     sizes = np.hypot(gaps[:count], gaps[count:]).max(axis=1, initial=0.0)
     sizes[np.any(np.isinf(moved), axis=1)] = np.inf
