@@ -1,4 +1,4 @@
-"""Nonlinear modes: periodic motions of a structure with contacts that nothing drives, over their amplitude."""
+"""Nonlinear modes: unforced periodic motions of a structure with contacts, over their amplitude."""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
-"""Backbones: frequency and damping ratio of a mode over its amplitude, from where nothing slips on.
+"""Backbones: frequency and damping ratio of a mode over its amplitude, from full stick on.
 
-The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 59-71): with ``C - ξ M`` in place of the damping C the motion of every
-amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without the added term. A conservative mode is one for which ξ comes out as zero.
+The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 59-71) replaces the damping C by ``C - ξ M``. Then a periodic motion exists
+at every amplitude, and ``ξ / 2ω`` is its damping ratio without the added term. For a conservative mode ξ is zero.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -32,16 +32,16 @@ from stickslip.units import millimetres, millimetres_between
 MEETS, OVER = "internal resonance", "stepped over an internal resonance"
 ROUNDED = 1e-9
 Concept = Literal["periodic", "decaying"]
-BEGINS = 0.5  # of the amplitude at which slip begins
-ENDS, GROSS = (300.0, 1e5)  # times that amplitude: where a curve ends, and where at the latest one to gross slip does
-TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
-CLOSER = 30  # points at least that may be put between those of a curve
-LOST = 3  # points in a row that are not found, after which a curve is at its end
+BEGINS = 0.5  # first amplitude of a curve, over the amplitude at the onset of slip
+ENDS, GROSS = (300.0, 1e5)  # last amplitude over that onset: of a curve, and of a curve to gross slip at the latest
+TIMES = 12  # largest number of points over the requested one: lift-off may fold a curve hundreds of times
+CLOSER = 30  # least budget of points that refine a curve
+LOST = 3  # failed points in a row that end a curve
 
 
 @dataclass(frozen=True, eq=False)
 class ModePoint:
-    """A periodic motion of a nonlinear mode.
+    """Periodic motion of a nonlinear mode.
 
     Attributes
     ----------
@@ -64,12 +64,12 @@ class ModePoint:
     slipping
         Share of the contact points that slip or open at some time; a contact with several sliders counts by its share of slipping ones.
     open_for
-        Largest share of the period for which a contact point is open.
+        Share of the period for which a contact point is open, the largest over all points.
     change
-        Larger predicted relative change of frequency and damping ratio by more harmonics; on the last level the change from fewer
-        harmonics; NaN with one set of harmonics.
+        Predicted relative change of frequency or damping ratio with more harmonics, the larger one. On the last level, the change from
+        fewer harmonics; NaN with one set of harmonics.
     sticking
-        Share of the contact points that stick all the time, among those that can slip.
+        Share of the points that can slip which stick throughout.
     """
 
     amplitude: float
@@ -93,12 +93,12 @@ class ModePoint:
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
-    """Nonlinear mode: its periodic motions over the amplitude.
+    """Periodic motions of a nonlinear mode over the amplitude.
 
     Attributes
     ----------
     system, load
-        System, and its static load.
+        System and its static load.
     mode
         Linear mode at small amplitudes.
     dof
@@ -108,9 +108,9 @@ class Backbone:
     end
         Reason for the end of the curve, in words.
     resonant
-        Harmonic of each point by which another mode takes part in the motion (internal resonance); 0 without any.
+        Harmonic in internal resonance with another mode at each point; 0 without any.
     other_ratio
-        Damping ratio by the other concept at the amplitude of `largest`; NaN where it has no motion near.
+        Damping ratio by the other concept (see `ModeSweep`) at the amplitude of `largest`; NaN without a motion nearby.
     """
 
     system: System
@@ -124,12 +124,12 @@ class Backbone:
 
     @property
     def largest(self) -> int | None:
-        """Index of the point of the largest damping ratio of this mode alone, without internal resonances; None without a solution."""
+        """Index of the point with the largest damping ratio, internal resonances excluded; None without a solution."""
         return most_damped([p.ratio if p.converged else np.nan for p in self.points], self.resonant)
 
     @property
     def solutions(self) -> tuple[ModePoint, ...]:
-        """The points that converged."""
+        """Converged points."""
         return tuple(p for p in self.points if p.converged)
 
 
@@ -140,18 +140,18 @@ class ModeSweep:
     Parameters
     ----------
     span
-        First and last amplitude of the coordinate, m, while the motion has the shape of the linear mode; otherwise amplitude of equal
-        kinetic energy over the square of the frequency. None: from half the amplitude at the onset of slip to 300 times that
-        amplitude, or to gross slip. Contacts that never slip or open need a span.
+        First and last amplitude of the coordinate, m, for a motion in the shape of the linear mode. Other motions count by their kinetic
+        energy over the square of the frequency. None: from half the amplitude at the onset of slip to 300 times the onset, or to gross
+        slip. Contacts that never slip or open need a span.
     points
         Smallest number of points.
     most_harmonics
-        Highest harmonic. Harmonics are raised from h to 2 h + 1 where frequency or damping ratio would change by more than the
-        `tolerance`; at or below the first number of harmonics: no raise.
+        Highest harmonic. The number of harmonics is raised from h to 2 h + 1 where frequency or damping ratio would change by more than
+        `tolerance`. It stays fixed if this is at most the initial number.
     tolerance
-        Relative change of frequency or damping ratio.
+        Acceptable relative change of frequency or damping ratio with more harmonics.
     to_gross_slip
-        Whether the curve ends where every contact that can slip has opened or slipped with all its sliders.
+        Whether the curve ends at gross slip: every contact that can slip has opened or slipped with all its sliders.
     concept
         ``periodic``: motions sustained by negative damping (Krack 2015); ``decaying``: free decaying motions, ``e^{λt}`` and its powers
         (Laxalde & Thouverez 2009).
@@ -191,7 +191,7 @@ class ModeWay:
     to_gross_slip: bool
 
     def follow(self, done: Sequence[Followed] = ()) -> Iterator[Followed]:
-        """Yield results up to the end of the mode, or until it is lost, except those in `done` from an interrupted run."""
+        """Yield results until the mode ends or is lost, without those in `done` from an interrupted run."""
         every = [one for one in done if one.kind != "between"]
         for one in self._followed(tuple(every)):
             every.append(one)
@@ -228,14 +228,14 @@ class ModeWay:
         return mode if most is None else replace(mode, other_ratio=self._by_the_other_concept(found[most]))
 
     def _by_the_other_concept(self, one: Followed) -> float:
-        """Return the damping ratio by the other concept at the amplitude of a point; NaN where it has no motion near."""
+        """Return the damping ratio by the other concept at the amplitude of a point; NaN without a motion nearby."""
         other = replace(self.curve, decaying=not self.curve.decaying, wider={})
         problem, own = other.problem(one.level), other.problems[one.level]
         found = newton(lambda y: problem.linearise(y, one.p), one.point.x, own.how.newton)
         return other.frequency_and_damping(one.level, found.x)[1] if found.status.converged else np.nan
 
     def _resonances(self, closer: Closer, made: Sequence[ModePoint]) -> str:
-        """Return where harmonics of the mode meet other modes that respond or may respond; empty without any."""
+        """Describe where harmonics of the mode meet other modes that respond or may respond; empty without any."""
         said = []
         for one in closer.crossings():
             ends = (made[one.first].amplitude, made[one.last].amplitude)
@@ -248,7 +248,7 @@ class ModeWay:
         return "".join(f"; {text}" for text in dict.fromkeys(said))
 
     def _ends(self, branch: Sequence[Followed], one: Followed) -> bool:
-        """Whether a mode is at its end with the latest point."""
+        """Whether the latest point ends the mode."""
         lost = len(branch) > LOST and not any(f.converged for f in branch[-LOST:])
         if lost or len(branch) > TIMES * self.route.points:
             return True
@@ -277,9 +277,9 @@ def nonlinear_mode(
     dof
         Coordinate of the reported amplitude.
     how
-        Harmonics, samples, solver; the initial harmonics where these are raised.
+        Initial harmonics, samples, solver.
     sweep
-        Range of amplitudes, and highest harmonic.
+        Range of amplitudes and highest harmonic.
 
     Raises
     ------
@@ -315,14 +315,16 @@ def mode_way(
 
 
 def most_damped(ratio: Sequence[float] | FloatArray, resonant: Sequence[int] | IntArray) -> int | None:
-    """Return the index of the largest damping ratio among points without an internal resonance, of all if there are no others; None without a solution.
+    """Return the index of the largest damping ratio; None without a solution.
+
+    Points in internal resonance count only if there are no others.
 
     Parameters
     ----------
     ratio
         Damping ratio of each point, NaN without a solution.
     resonant
-        Harmonic of each point by which another mode takes part, 0 without any; may be empty.
+        Harmonic in internal resonance at each point, 0 without any; may be empty.
     """
     values = np.asarray(ratio, dtype=float)
     alone = np.where(np.asarray(resonant) > 0, np.nan, values) if len(resonant) else values
@@ -364,7 +366,10 @@ def _product(system: System, harmonic: int, moving: ComplexArray) -> float:
 
 
 def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:
-    """Return the number of points that no branch reached: they lie a known share of the longest step ahead of all others, and continue with the first step."""
+    """Count the restarts beyond a lost branch.
+
+    A restart lies a known share of the longest step ahead of all other points and continues with the first step length.
+    """
     count, farthest = 0, found[0].p
     for f in found[1:]:
         ahead = (f.p - farthest) / route.gap
@@ -375,7 +380,7 @@ def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:
 
 
 def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bool) -> str:
-    """Return how a curve with the last point `found` ended."""
+    """Describe the end of a curve whose last point is `found`."""
     solved = [p for p in points if p.converged]
     if not solved:
         return "no motion found at the first amplitude"

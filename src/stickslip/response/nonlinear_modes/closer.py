@@ -1,8 +1,11 @@
-"""Refinement of a nonlinear mode: at knees, at extremes, and where a harmonic meets another mode.
+"""Refinement of a nonlinear mode at knees, at extremes, and where a harmonic meets another mode.
 
-A branch that is followed by steps of the shape's change goes past what is narrower than a step. Three tests say where: a point that its neighbours
-do not foretell; the parabola through a largest or least value and its neighbours, whose top is off that value; and the number of negative eigenvalues
-of the symmetric part of the Jacobian's block of a harmonic h above the first, which changes where another mode has the frequency hω.
+The continuation controls its steps by the change of the shape and may step over narrow features. Three tests find them:
+
+- knee: interpolation between the neighbours misses a point;
+- extreme: the vertex of the parabola through an extreme value and its neighbours differs from that value;
+- internal resonance: the negative eigenvalues of the symmetric part of the Jacobian's block of a harmonic h > 1 change in number where
+  another mode has the frequency hω.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,15 +26,17 @@ from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import newton
 
-KNEE = 0.02  # relative difference of frequency or damping ratio from what neighbours foretell
-EXTREME = 1e-3  # relative difference of the top of a parabola from the largest or least value that is known
-LOCATED = 0.01  # of ln a: interval in which a harmonic passes the frequency of another mode
-SILENT = 1e-6  # of the first harmonic: what a harmonic has that no force acts on
-TAKES_PART = 0.03  # of the speed of the first harmonic, by which another mode changes a harmonic as it is passed, from where it takes part
-AMPLIFIED = 0.1  # of that speed, which a harmonic has outside the mode's own shape: a damped resonance is passed over many points, with small changes
-REACHES = 0.05  # of that speed: around such a passage, points with more belong to the internal resonance
-MOST_ROWS = 400  # of a harmonic's block whose eigenvalues are counted
-SHORTEST = 1e-3  # of ln a: points are not set closer
+KNEE = 0.02  # relative difference of frequency or damping ratio from interpolation between the neighbours
+EXTREME = 1e-3  # relative difference of a parabola's vertex from the known extreme value
+LOCATED = 0.01  # width in ln a at which a crossing counts as located
+SILENT = 1e-6  # velocity of a harmonic over the first, up to which no force acts on it
+TAKES_PART = 0.03  # velocity change of a harmonic across a crossing, over the first harmonic, above which the other mode takes part
+# velocity of a harmonic outside the mode's shape, over the first harmonic, above which it takes part as well:
+# a damped resonance extends over many points with small changes
+AMPLIFIED = 0.1
+REACHES = 0.05  # such a velocity above which neighbouring points belong to the internal resonance, too
+MOST_ROWS = 400  # largest block of a harmonic whose eigenvalues are counted
+SHORTEST = 1e-3  # smallest distance of points in ln a
 
 
 @dataclass(frozen=True)
@@ -45,16 +50,15 @@ class Crossing:
     first, last
         Indices of the points on either side.
     share
-        Change of the velocity amplitude of that harmonic between them, over that of the first harmonic; a mode that takes part changes
-        its sign.
+        Change of the harmonic's velocity amplitude between them, over the first harmonic; a mode that takes part reverses its sign.
     width
         Length of the interval in ln a.
     level
-        Velocity amplitude of that harmonic outside the mode's own shape, over that of the first harmonic.
+        Velocity amplitude of the harmonic outside the mode's own shape, over the first harmonic.
     mode
         Number of the other mode, by frequency.
     same_waves
-        Whether it is a mode of the same structure; on a wheel harmonics are other waves.
+        Whether the other mode is one of the same structure; on a wheel, harmonics are other waves.
     """
 
     harmonic: int
@@ -74,7 +78,10 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Quantities of a point that the tests use: ln a, frequency and damping ratio, the motion (H + 1, n) over a, and for each harmonic from 2 on the number of modes below it."""
+    """Quantities of a point for the tests.
+
+    They are ln a, frequency and damping ratio, the motion (H + 1, n) over a, and for each harmonic from 2 on the number of modes below it.
+    """
 
     p: float
     numbers: FloatArray
@@ -84,14 +91,14 @@ class _Place:
 
 @dataclass(eq=False)
 class Closer:
-    """Refinement of a branch by points between its points.
+    """Refinement of a branch by intermediate points.
 
     Parameters
     ----------
     curve
-        The motions.
+        Equations of the motions.
     branch
-        Points of the branch in their order; new points are inserted between them.
+        Points of the branch in their order; new points are inserted.
     """
 
     curve: ModeCurve
@@ -101,7 +108,7 @@ class Closer:
     _inside: dict[int, FloatArray] = field(default_factory=dict, repr=False)
 
     def run(self, most: int, done: Sequence[Followed] = ()) -> Iterator[Followed]:
-        """Yield up to `most` points that are not in `done`, each to be put behind the point of its index."""
+        """Insert up to `most` points, and yield those not in `done`; each follows the point of its index."""
         stored, added = list(done), 0
         while added < most:
             need, i = max(self._needs(), default=(0.0, -1))
@@ -117,7 +124,7 @@ class Closer:
                 yield made
 
     def crossings(self) -> list[Crossing]:
-        """Return where harmonics that move pass frequencies of other modes."""
+        """Return the crossings of moving harmonics with frequencies of other modes."""
         found = []
         for i, (one, other) in enumerate(self._pairs()):
             for k, (a, b) in enumerate(zip(one.negative, other.negative, strict=False), 2):
@@ -129,7 +136,7 @@ class Closer:
         return found
 
     def resonant(self) -> list[int]:
-        """Return for each point the harmonic by which another mode takes part in the motion; 0 without any."""
+        """Return for each point the harmonic in internal resonance with another mode; 0 without any."""
         found = [0] * len(self.branch)
         for one in self.crossings():
             if not one.takes_part:
@@ -142,10 +149,10 @@ class Closer:
             found[low : high + 1] = [one.harmonic] * (high + 1 - low)
         return found
 
-    # --- where ----------------------------------------------------------------------------------
+    # --- tests ----------------------------------------------------------------------------------
 
     def _needs(self) -> Iterator[tuple[float, int]]:
-        """Yield by how much each test asks for a point behind that of an index: above 1 it does."""
+        """Yield the need for a point after an index, by each test; above 1 a point is inserted."""
         wanted = [*self._of_knees(), *self._of_extremes()]
         wanted += [(c.width / LOCATED, c.first) for c in self.crossings()]
         for need, i in wanted:
@@ -182,7 +189,7 @@ class Closer:
                 p = np.array([f.p for f in self.branch[i - 1 : i + 2]])
                 yield from _of_top(p, own[i - 1 : i + 2], i)
 
-    # --- what -----------------------------------------------------------------------------------
+    # --- quantities of a point ------------------------------------------------------------------
 
     def _reached(self, i: int, harmonic: int) -> bool:
         """Whether an internal resonance of a harmonic reaches a point."""
@@ -190,7 +197,7 @@ class Closer:
         return one.converged and self._beside(harmonic, self._place(one)) > REACHES
 
     def _beside(self, harmonic: int, place: _Place) -> float:
-        """Return the velocity amplitude of a harmonic outside the shape of the first one, over that of the first."""
+        """Return the velocity amplitude of a harmonic outside the shape of the first harmonic, over the first."""
         if harmonic >= len(place.motion):
             return 0.0
         moving, own = place.motion[harmonic], place.motion[1]
@@ -200,7 +207,7 @@ class Closer:
         return self._speed(harmonic, moving)
 
     def _same_waves(self, harmonic: int) -> bool:
-        """Whether a harmonic moves the structure as the first one does."""
+        """Whether a harmonic has the same structural matrices as the first one."""
         structure = self.curve.problems[0].system.structure
         return structure.of_harmonic(harmonic) is structure.of_harmonic(1)
 
@@ -220,12 +227,15 @@ class Closer:
         return self._places[id(found)]
 
     def _speed(self, harmonic: int, moving: ComplexArray) -> float:
-        """Return the root of X^H M X of a harmonic (n,), times its number."""
+        """Return ``h sqrt(X^H M X)`` of a harmonic (n,)."""
         mass = self.curve.problems[0].system.structure.of_harmonic(harmonic).mass
         return harmonic * float(np.sqrt(max(np.vdot(moving, mass @ moving).real, 0.0)))
 
     def _negative(self, found: Followed) -> tuple[int, ...]:
-        """Return the number of modes below the frequency of each harmonic from 2 on: of the condensed block and, by Haynsworth's rule, of the interior."""
+        """Return the number of modes below the frequency of each harmonic from 2 on.
+
+        By Haynsworth's rule these are the modes of the condensed block and of the interior together.
+        """
         own = self.curve.problems[found.level]
         n, omega = own.balance.linear.n, own.omega(found.point.x)
         if max(2 * n, own.system.structure.n) > MOST_ROWS:
@@ -243,7 +253,7 @@ class Closer:
         return tuple(counts)
 
     def _interior(self, own: SelfExcited, harmonic: int) -> FloatArray:
-        """Return one over the squares of the frequencies, s²/rad², that the condensed coordinates have with the retained ones at rest."""
+        """Return the inverse squares of the fixed-interface frequencies, s²/rad²: the retained coordinates are held."""
         if harmonic not in self._inside:
             side = own.system.structure.of_harmonic(harmonic)
             inner = np.setdiff1d(np.arange(own.system.structure.n), own.balance.linear.retained)
@@ -253,7 +263,7 @@ class Closer:
         return self._inside[harmonic]
 
     def _between(self, i: int) -> Followed | None:
-        """Return the motion in the middle behind a point; None where none is near both."""
+        """Return the motion midway between a point and the next; None unless it is near both."""
         one, other = self.branch[i], self.branch[i + 1]
         level, p = max(one.level, other.level), 0.5 * (one.p + other.p)
         problem = self.curve.problems[level]
@@ -268,7 +278,10 @@ class Closer:
 
 
 def _of_top(p: FloatArray, values: FloatArray, i: int) -> Iterator[tuple[float, int]]:
-    """Yield by how much the top of the parabola through the largest value, that of index `i`, and its neighbours is off it, behind which point."""
+    """Yield the need for a point near the largest value, which has the index `i`, and the index after which it is inserted.
+
+    The need is the distance of the vertex of the parabola through it and its neighbours from this value.
+    """
     if not np.all(np.isfinite(values)) or not (p[0] < p[1] < p[2] or p[0] > p[1] > p[2]):
         return
     a, b, c = np.polyfit(p - p[1], values, 2)

@@ -1,6 +1,6 @@
-"""A nonlinear mode as a curve whose harmonics are raised where frequency or damping ratio ask for it.
+"""Curve of a nonlinear mode with harmonics raised where frequency or damping ratio need more.
 
-Its modal amplitude follows from the kinetic energy, which internal resonances leave unaffected.
+The amplitude is measured by the kinetic energy, so that the curve passes internal resonances.
 """
 
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ from stickslip.solve.continuation import Point, StepControl
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Solution, first_converged, newton
 
-LARGEST = 0.1  # change of the shape in a step: with 0.25 a mode of a chain went past two of its four folds
-CORRECTIONS = 8  # Newton steps to a point: beyond a corner a shorter step takes fewer
-GROWTH = 2.5  # of steps beyond a corner, where they have become short
-MORE = 2  # times the harmonics, and one, from one level to the next
-SAFETY = 1.25
+LARGEST = 0.1  # largest change of the shape in a step: with 0.25 the mode of a chain missed two of its four folds
+CORRECTIONS = 8  # most Newton steps to a point: beyond a corner a shorter step takes fewer
+GROWTH = 2.5  # largest growth of a step, after steps became short at a corner
+MORE = 2  # a level with h harmonics is followed by one with MORE h + 1
+SAFETY = 1.25  # on predicted changes
 AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
 SAME_SHEET_RTOL = 0.3
-FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
-SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
+FAINT_RATIO = 1e-4  # smallest reference of relative changes of the damping ratio
+SMALL = 100.0  # number of unknowns at which half the work of a Newton step grows with the unknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +41,11 @@ class ModeCurve(Curve):
     problems
         The mode with the harmonics of each level.
     control
-        Steps.
+        Step control.
     tolerance
         Relative change of frequency or damping ratio beyond which harmonics are raised.
     decaying
-        Whether motions are free decays at the complex frequency λ. Otherwise they are steady motions sustained by negative damping.
+        Whether motions are free decays with the complex eigenvalue λ. Otherwise they are steady motions sustained by negative damping.
     """
 
     problems: tuple[SelfExcited, ...]
@@ -67,7 +67,7 @@ class ModeCurve(Curve):
         *,
         decaying: bool = False,
     ) -> "ModeCurve":
-        """Return the curve of a mode with its harmonics, and levels of more up to `most`."""
+        """Return the curve of a mode with its harmonics and higher levels up to `most`."""
         every = [problem]
         while every[-1].balance.order < most:
             every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
@@ -82,7 +82,7 @@ class ModeCurve(Curve):
 
     @cached_property
     def equations(self) -> tuple[PeriodicProblem, ...]:
-        """The equation of each level."""
+        """Periodic problem of each level."""
         return tuple(map(self._equation, self.problems))
 
     def _equation(self, own: SelfExcited) -> PeriodicProblem:
@@ -90,14 +90,14 @@ class ModeCurve(Curve):
         return own.over_amplitude(family, held=by_energy(own), linear_alone=True)
 
     def judging(self, level: int) -> tuple[SelfExcited, PeriodicProblem] | None:
-        """Return the mode and its equation with the judging set of harmonics of a level; None where a wheel lacks these waves."""
+        """Return the mode and its periodic problem with the harmonics that judge a level; None if a wheel lacks their waves."""
         if level not in self.wider:
             made = self.problems[level].judging()
             self.wider[level] = None if made is None else (made, self._equation(made))
         return self.wider[level]
 
     def linear(self, level: int, y: FloatArray) -> DynamicStiffness:
-        """Return the dynamic stiffness in a motion."""
+        """Return the dynamic stiffness at the frequency of a motion."""
         own = self.problems[level]
         return (own.decaying if self.decaying else own.damped)(float(y[-1])).linear
 
@@ -117,11 +117,11 @@ class ModeCurve(Curve):
         return preload(own.system, own.load.static)
 
     def problem(self, level: int) -> PeriodicProblem:
-        """Return the equation of a level."""
+        """Return the periodic problem of a level."""
         return self.equations[level]
 
     def following(self, level: int) -> Following:
-        """Return the continuation options of a level: step lengths count vibration, frequency and damping level, not the mean."""
+        """Return the continuation options of a level: the step length measures vibration, frequency and damping, not the mean."""
         own = self.problems[level]
         weights = np.ones(own.balance.size + 2)
         weights[: own.balance.linear.n] = 0.0
@@ -131,7 +131,7 @@ class ModeCurve(Curve):
         )
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
+        """Solve at an amplitude from nearby motions, or from the linear mode about the static state."""
         own, equation = self.problems[level], self.problem(level)
         starts = [self.lifted(n.point.x, n.level, level) for n in near]
         starts.append(own.guess(self.static, float(np.exp(p))))
@@ -144,22 +144,25 @@ class ModeCurve(Curve):
         return first_converged(attempts)
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
-        """Return unknowns of one level as those of another; missing harmonics are zero."""
+        """Convert unknowns from one level to another; missing harmonics are zero."""
         return x if level == to else _lifted(self.problems[level], self.problems[to], x)
 
     def cost(self, level: int) -> float:
-        """Return the work of a Newton step."""
+        """Return the relative work of a Newton step."""
         return 1.0 + self.problems[level].balance.size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Predict by a Newton step the change of frequency and damping ratio by the judging set; on the last level also from fewer harmonics."""
+        """Predict the change of frequency and damping ratio by a Newton step with the judging harmonics.
+
+        On the last level, the change from fewer harmonics counts, too.
+        """
         if level + 1 == self.levels > 1:
             last = self.at_the_cap(level, point)
             return last if last.bound > self.tolerance else Judged(np.fmax(last.bound, self._foretold(level, point)))
         return Judged(self._foretold(level, point))
 
     def _foretold(self, level: int, point: Point) -> float:
-        """Return the change by a Newton step towards the judging set; NaN where a wheel has no such waves."""
+        """Return the change by a Newton step with the judging harmonics; NaN if a wheel lacks their waves."""
         wider = self.judging(level)
         if wider is None:
             return np.nan
@@ -205,14 +208,14 @@ class ModeCurve(Curve):
         return self._change(more.level, lifted, more.point.x)
 
     def _change(self, level: int, one: FloatArray, other: FloatArray) -> float:
-        """Return the relative difference of two motions in frequency or damping ratio, the larger one."""
+        """Return the larger of the relative differences of two motions in frequency and damping ratio."""
         (slow, few), (fast, many) = (self.frequency_and_damping(level, y) for y in (one, other))
         size = max(abs(few), abs(many), FAINT_RATIO)
         return max(abs(fast / slow - 1.0), abs(many - few) / size)
 
 
 def _lifted(own: SelfExcited, other: SelfExcited, x: FloatArray) -> FloatArray:
-    """Return unknowns of a mode as those of the same mode with other harmonics."""
+    """Convert unknowns of a mode to other harmonics."""
     a, b = (replace(p.balance, displacement_scale=1.0) for p in (own, other))
     return np.append(b.unknowns(a.coefficients(x[:-2])), x[-2:])
 
@@ -247,7 +250,7 @@ class Phase:
     Parameters
     ----------
     row
-        (n,) vector whose product with the first harmonic is that share.
+        (n,) vector whose product with the first harmonic is this share.
     """
 
     row: ComplexArray
@@ -264,9 +267,9 @@ class Phase:
 
 
 def by_energy(problem: SelfExcited) -> tuple[Size, Phase]:
-    """Return amplitude and phase conditions of a mode from its kinetic energy; size one of the linear mode is amplitude one of its coordinate.
+    """Return the amplitude and phase conditions of a mode from its kinetic energy.
 
-    The mass matrix is condensed at the frequency of the linear mode.
+    The linear mode has size one where its coordinate has amplitude one. The mass matrix is condensed at the frequency of the linear mode.
     """
     linear, mode = problem.balance.linear, problem.mode
     own = problem.system.structure.of_harmonic(1)
@@ -285,7 +288,7 @@ def _vibration(state: State) -> ComplexArray:
 
 
 def _row(state: State, slope: ComplexArray) -> FloatArray:
-    """Return the derivative by all unknowns of what changes by ``Re sum_h slope_h^H X_h``."""
+    """Return the gradient by all unknowns of a function whose differential is ``Re sum_h slope_h^H dX_h``."""
     out = np.zeros(state.y.size)
     rows = np.zeros((state.setting.balance.n_rows, slope.shape[1]))
     rows[1::2], rows[2::2] = slope.real, -slope.imag

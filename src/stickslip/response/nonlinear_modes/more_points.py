@@ -17,9 +17,9 @@ from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.solve.branch import Point
 from stickslip.solve.newton_method import newton
 
-FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
-DOUBT = 4.0  # times the tolerance by which a point is off what those twice as far apart foretell
-SHORTEST = 1e-3  # of ln a: points are not set closer
+FAINT_RATIO = 1e-4  # smallest reference of relative changes of the damping ratio
+DOUBT = 4.0  # factor on the tolerance for interpolation without the point itself, over twice the distance
+SHORTEST = 1e-3  # smallest distance of points in ln a
 
 
 @by_one_thread
@@ -31,11 +31,11 @@ def refined(
     Parameters
     ----------
     backbone
-        As `nonlinear_mode` found it.
+        Result of `nonlinear_mode`.
     load
         Static and harmonic load, N.
     how
-        Samples and solver; the highest harmonic is that of the backbone.
+        Samples and solver; the highest harmonic is taken from the backbone.
     tolerance
         Relative error of the interpolation midway between two points.
     most
@@ -64,7 +64,7 @@ def refined(
 
 @dataclass(frozen=True, eq=False)
 class _Solver:
-    """The equation of the mode, with one set of harmonics."""
+    """Solver of the mode with one set of harmonics."""
 
     curve: ModeCurve
     size: Size
@@ -77,7 +77,7 @@ class _Solver:
         return cls(ModeCurve.of(own, (1.0, np.e), 1), by_energy(own)[0])
 
     def between(self, before: ModePoint, after: ModePoint) -> ModePoint | None:
-        """Return the motion with a modal amplitude between those of two points."""
+        """Return the motion at the geometric mean of two points' amplitudes."""
         own, equation = self.curve.problems[0], self.curve.problem(0)
         sizes = [self._size(p) for p in (before, after)]
         motions = [self._retained(p) / s for p, s in zip((before, after), sizes, strict=True)]
@@ -104,7 +104,10 @@ class _Solver:
 def _doubted(
     backbone: Backbone, load: HarmonicLoad, known: Sequence[ModePoint], tolerance: float
 ) -> list[tuple[float, ModePoint, ModePoint]]:
-    """Return neighbours about which something is in doubt, those that are most at the end: where one point is not foretold by the others."""
+    """Return pairs of neighbours between which interpolation is doubtful, with its error, the worst pair last.
+
+    A pair is doubtful if interpolation between the other points misses one of the two.
+    """
     off = np.zeros(len(known))
     for i in range(1, len(known) - 1):
         others = [*known[:i], *known[i + 1 :]]
@@ -135,7 +138,7 @@ def _own_numbers(load: HarmonicLoad, point: ModePoint) -> FloatArray:
 
 
 def _distance(foretold: FloatArray, found: FloatArray) -> float:
-    """Return the relative difference of two sets of numbers, the largest."""
+    """Return the largest relative difference of two sets of numbers."""
     size = np.maximum(np.abs(found), [0.0, FAINT_RATIO, 0.0])
     return float(np.max(np.abs(foretold - found) / np.maximum(size, 1e-300)))
 

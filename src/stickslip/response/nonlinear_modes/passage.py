@@ -1,13 +1,13 @@
-"""Transient passage through a resonance: the slowly varying amplitude of a nonlinear mode under a force whose frequency is swept.
+"""Transient passage through a resonance: slowly varying amplitude of a nonlinear mode under a force with swept frequency.
 
-The modal amplitude is complex, ``A = a exp(iθ)``, against a force of phase φ with ``dφ/dt = Ω(t)``. The modal stiffness of `one_mass` is a
-product ``(iΩ - λ) (iΩ + d + λ)``, d the dashpots and λ an eigenvalue, near ``-ζω + iω``, that depends on the amplitude. The equation of motion is
-nearly the same product with ``d/dt + iΩ`` in place of ``iΩ``. Its second factor turns twice as fast as the motion, and follows the force without
-delay. What remains is
+The complex modal amplitude ``A = a exp(iθ)`` is relative to a force of phase φ with ``dφ/dt = Ω(t)``. The modal stiffness of `sdof_oscillator` is a
+product ``(iΩ - λ) (iΩ + d + λ)`` with the dashpots d and an eigenvalue λ, near ``-ζω + iω``, that depends on the amplitude. The equation of motion is
+nearly the same product with ``d/dt + iΩ`` in place of ``iΩ``. The motion of its second factor oscillates at about 2Ω in this frame and follows the
+force without delay. The slow equation is
 
     (iΩ + d + λ) dA/dt + A dλ/dt = f - (iΩ - λ) (iΩ + d + λ) A ,
 
-where λ changes with the amplitude alone. Its steady motions are those of the synthesis, and a free motion decays and beats with the force as it does.
+where λ depends on the amplitude only. Its steady motions agree with the synthesis, and its free motions have the right decay and frequency.
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import checked_level, motions_at
 
-CELLS = 4096  # of the table of the oscillator over ln a
-PER_BEAT = 24  # moments that are kept of a beat between the force and the mode, about
-MIN_MOMENTS, MAX_MOMENTS = 400, 20_000  # moments that are kept
+CELLS = 4096  # cells of the oscillator's table over ln a
+PER_BEAT = 24  # approximate number of stored moments in a beat between force and mode
+MIN_MOMENTS, MAX_MOMENTS = 400, 20_000  # stored moments
 JUDGED_PEAK_SHARE = 0.5  # share of the peak above which a passage is judged
 
 
@@ -36,7 +36,7 @@ class Swept:
     ends
         First and last frequency, rad/s; the last may be the lower one.
     rate
-        Change of the frequency in a second, above zero, rad/s².
+        Sweep rate, above zero, rad/s².
     tolerance
         Relative error of a step.
     """
@@ -56,18 +56,18 @@ class Swept:
 
     @property
     def seconds(self) -> float:
-        """Time of the passage."""
+        """Duration of the passage, s."""
         return abs(self.ends[1] - self.ends[0]) / self.rate
 
     @property
     def signed_rate(self) -> float:
-        """Change of the frequency in a second, rad/s²; negative for a falling one."""
+        """Sweep rate, rad/s²; negative for falling frequencies."""
         return float(np.copysign(self.rate, self.ends[1] - self.ends[0]))
 
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A passage through a resonance, all arrays (p,).
+    """Passage through a resonance, all arrays (p,).
 
     Parameters
     ----------
@@ -80,12 +80,11 @@ class Passage:
     amplitude
         Modal amplitude, kg^0.5 m.
     phase
-        Phase of the motion against that of the backbone, relative to the force, rad.
+        Phase of the motion relative to the force, with the backbone's phase as zero, rad.
     finished
         Whether the last frequency was reached; otherwise the motion grew beyond the backbone.
     change
-        Largest relative change of the complex amplitude per radian of the vibration, while it is above half its peak. The method assumes
-        that it is small.
+        Largest relative change of the complex amplitude per radian of the vibration, above half the peak. The method assumes a small value.
     """
 
     time: FloatArray
@@ -98,14 +97,14 @@ class Passage:
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Largest modal amplitude, and the frequency of the force then."""
+        """Largest modal amplitude and the frequency of the force at that moment."""
         top = int(np.argmax(self.amplitude))
         return float(self.amplitude[top]), float(self.omega[top])
 
 
 @by_one_thread
 def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: Swept) -> Passage:
-    """Follow the amplitude of a nonlinear mode while the frequency of its force is swept at a constant rate.
+    """Compute the amplitude of a nonlinear mode while the frequency of its force is swept at a constant rate.
 
     Parameters
     ----------
@@ -119,7 +118,7 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
     Raises
     ------
     InputError
-        If the backbone turns back in its amplitude, or holds no steady motion at the first frequency.
+        If the amplitude turns back along the backbone, or there is no steady motion at the first frequency.
     """
     table = _Table.of(oscillator)
     starts = motions_at(oscillator, checked_level(level), sweep.ends[0])
@@ -166,7 +165,7 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """The oscillator on an even grid of ln a, for one amplitude after the other."""
+    """Oscillator on an even grid of ln a, for fast evaluation at single amplitudes."""
 
     first: float
     width: float
@@ -198,7 +197,7 @@ class _Table:
         row = (1.0 - share) * self.rows[cell] + share * self.rows[cell + 1]
         eigenvalue, viscous, force, by_size = row.tolist()
         fast = 1j * driven + viscous + eigenvalue
-        # (fast + by_size) g + i fast h = pull, with dA/dt = (g + ih) A: a growing motion drags its own frequency along
+        # (fast + by_size) g + i fast h = pull, with dA/dt = (g + ih) A: λ changes with the amplitude
         pull = (eigenvalue - 1j * driven) * fast + level * force / amplitude
         across = (1j * fast).conjugate()
         grows = (pull * across).imag / ((fast + by_size) * across).imag

@@ -1,13 +1,13 @@
-"""A backbone as an oscillator of one degree of freedom: its frequency, damping and force at every amplitude.
+"""Backbone as an oscillator of one degree of freedom: frequency, damping and force at every amplitude.
 
-The motion of a nonlinear mode needs damping of ``-2 ζ ω`` times the mass to go on. What a force of the frequency Ω has to do in its place
-follows from the balance of the first harmonic, weighted by the shape ψ of unit modal mass:
+Damping of ``-2 ζ ω`` times the mass sustains the motion of a nonlinear mode. A force of the frequency Ω that sustains it instead follows
+from the balance of the first harmonic, weighted by the shape ψ of unit modal mass:
 
     D(Ω, a) a = ψᴴ f ,    D = ω² - Ω² + i (2 ζ ω² + (Ω - ω) ψᴴ C ψ) .
 
-The friction force of a motion does not know how fast it runs, a dashpot does: that is the difference to ``2 i ζ ω Ω`` of M. Krack, L. Panning-von
-Scheidt and J. Wallaschek, "On the computation of the slow dynamics of nonlinear modes of mechanical systems", Mechanical Systems and Signal
-Processing 42 (2014) 71-87, which has it for all damping.
+Friction forces do not depend on the frequency of a motion, dashpot forces do. M. Krack, L. Panning-von Scheidt and J. Wallaschek, "On the computation
+of the slow dynamics of nonlinear modes of mechanical systems", Mechanical Systems and Signal Processing 42 (2014) 71-87, use ``2 i ζ ω Ω`` for all
+damping.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint
 
-MIN_BACKBONE_POINTS = 4  # points of a backbone between which there is something to interpolate
-LINEAR = 1e-3  # relative difference of frequency and damping from those of the linear mode at which a backbone counts as begun in it
-BELOW = 1e-6  # times the first amplitude: how far a linear mode is continued
-STEPS_TO_LEAST = 6  # of Newton to the frequency that needs the least force
-INSIDE = 24  # places between two points at which the force is looked at
+MIN_BACKBONE_POINTS = 4  # for interpolation
+LINEAR = 1e-3  # relative difference from frequency and damping of the linear mode, below which a backbone begins linear
+BELOW = 1e-6  # smallest amplitude of the linear continuation, over the first amplitude
+STEPS_TO_LEAST = 6  # Newton steps to the frequency that needs the least force
+INSIDE = 24  # positions between two points at which the force is evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +41,9 @@ class Oscillation:
     omega, ratio
         Frequency, rad/s, and damping ratio of the nonlinear mode.
     force
-        Complex modal force of the unit level, N kg^-0.5.
+        Complex modal force at level 1, N kg^-0.5.
     viscous
-        ``ψᴴ C ψ``, 1/s: the part of the damping that grows with the frequency; its imaginary part is gyroscopic.
+        ``ψᴴ C ψ``, 1/s: damping that grows with the frequency; its imaginary part is gyroscopic.
     """
 
     amplitude: FloatArray
@@ -76,7 +76,7 @@ class Oscillation:
         )
 
     def resonance(self) -> FloatArray:
-        """Return the frequencies, rad/s, at which the least force keeps the amplitude."""
+        """Return the frequencies, rad/s, that need the least force for each amplitude."""
         q = self.polynomial()
         omega = self.omega.copy()
         for _ in range(STEPS_TO_LEAST):
@@ -89,7 +89,7 @@ class Oscillation:
 class ModalOscillator:
     """Backbone under a load; `modal_oscillator` makes one.
 
-    Positions on the backbone are measured by the accumulated change of ln a from its beginning, also where the amplitude turns back.
+    The position on the backbone is the accumulated change of ln a from its beginning; it grows also where the amplitude turns back.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class ModalOscillator:
     begins
         Position of the first point of the backbone; the linear mode precedes it.
     change
-        (p,) larger predicted relative change of frequency and damping ratio by more harmonics.
+        (p,) predicted relative change of frequency or damping ratio with more harmonics, the larger one.
     """
 
     backbone: Backbone
@@ -117,25 +117,25 @@ class ModalOscillator:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """First and last place."""
+        """First and last position on the backbone."""
         return float(self.place[0]), float(self.place[-1])
 
     def at(self, place: FloatArray) -> Oscillation:
-        """Return the oscillator at places."""
+        """Return the oscillator at positions on the backbone."""
         v = self.numbers(place)
         return Oscillation(
             np.exp(v[..., 0]), np.exp(v[..., 1]), v[..., 2], v[..., 3] + 1j * v[..., 4], v[..., 5] + 1j * v[..., 6]
         )
 
     def needed(self, place: FloatArray) -> FloatArray:
-        """Return the smallest load level for the amplitudes at positions on the backbone."""
+        """Return the smallest load level that sustains the motions at positions on the backbone."""
         here = self.at(place)
         own = np.abs(here.stiffness(here.resonance())) * here.amplitude
         with np.errstate(divide="ignore"):
             return np.asarray(own / np.abs(here.force))
 
     def by_harmonics(self, place: float) -> float:
-        """Return the larger predicted relative change of frequency and damping ratio by more harmonics near a position; NaN if unknown."""
+        """Return the predicted relative change of frequency or damping ratio with more harmonics near a position; NaN if unknown."""
         if place < self.begins:
             return 0.0
         after = int(np.clip(np.searchsorted(self.place, place), 1, self.place.size - 1))
@@ -143,7 +143,7 @@ class ModalOscillator:
 
     @cached_property
     def table(self) -> FloatArray:
-        """Positions of the points of the backbone, with enough positions between them for interpolation."""
+        """Positions of the points of the backbone, and intermediate ones."""
         gaps = np.linspace(self.place[:-1], self.place[1:], INSIDE, endpoint=False)
         return np.append(gaps.T.reshape(-1), self.place[-1])
 
@@ -158,26 +158,26 @@ class ModalOscillator:
         return PchipInterpolator(self.place, np.stack([shape.real, shape.imag]), axis=1)
 
     def first(self, place: FloatArray) -> ComplexArray:
-        """Return (p, n) first harmonics of all dofs at places, m, in the phase of the backbone."""
+        """Return (p, n) first harmonics of all dofs at positions, m, in the phase of the backbone."""
         parts = self._first(place)
         return np.asarray((parts[0] + 1j * parts[1]) * self.at(place).amplitude[:, None])
 
     @cached_property
     def _all(self) -> PchipInterpolator:
-        # what vibrates grows with the amplitude, and the mean does not
+        # the vibration scales with the amplitude, the mean does not
         size = self.at(self.place).amplitude[:, None, None]
         relative = np.concatenate([self.motion[:, :1], self.motion[:, 1:] / size], axis=1)
         return PchipInterpolator(self.place, np.stack([relative.real, relative.imag]), axis=1)
 
     def displacement(self, place: FloatArray, dofs: IntArray | None = None) -> ComplexArray:
-        """Return (p, H+1, k) displacements of dofs at places, m, in the phase of the backbone; None: all dofs."""
+        """Return (p, H+1, k) displacements of dofs at positions, m, in the phase of the backbone; None: all dofs."""
         parts = self._all(place) if dofs is None else self._all(place)[..., dofs]
         found = parts[0] + 1j * parts[1]
         found[:, 1:] *= self.at(place).amplitude[:, None, None]
         return np.asarray(found)
 
     def gaps(self, place: FloatArray) -> ComplexArray:
-        """Return (p, H+1, 3 n_contacts) gaps t, w, n of all contacts at places, m, in the phase of the backbone."""
+        """Return (p, H+1, 3 n_contacts) gaps t, w, n of all contacts at positions, m, in the phase of the backbone."""
         operator = self.backbone.system.interface.gap_operator
         motion = self.displacement(place)
         flat = motion.reshape(-1, motion.shape[2])
@@ -197,15 +197,15 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
     Parameters
     ----------
     backbone
-        The mode, with the static load that it was found with.
+        The mode with its static load.
     load
-        Forces on all dofs, N; the harmonic ones are those of level 1.
+        Forces on all dofs, N; the harmonic forces are level 1.
 
     Raises
     ------
     InputError
-        If the load drives another harmonic than the first, does not drive the mode or has another static part, or the backbone has too
-        few converged points.
+        If the load drives another harmonic than the first, does not drive the mode, or has another static part than the backbone; or if the
+        backbone has too few converged points.
     """
     points = [p for p in backbone.points if p.status.converged]
     if len(points) < MIN_BACKBONE_POINTS:
@@ -226,7 +226,7 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
     ]
     place = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(logs)))])
     begins, change = 0.0, np.array([p.change for p in points])
-    if begins_linear:  # below the first point the mode is linear, and its motion in proportion
+    if begins_linear:  # below the first point the mode is linear: its motion is proportional to the amplitude
         less = np.log(BELOW)
         faint = motion[:1].copy()
         faint[:, 1:] *= BELOW
@@ -240,7 +240,7 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
 
 
 def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:
-    """Return the force of the first harmonic, after checking that it is one of this mode."""
+    """Return the force of the first harmonic, after checking that it drives this mode."""
     others = sorted(h for h, f in load.harmonics.items() if h != 1 and np.any(f))
     if others:
         raise input_error(
@@ -268,7 +268,7 @@ def _is_linear(backbone: Backbone, first: ModePoint) -> bool:
 
 
 def _transported(motions: Sequence[ComplexArray], mass: Matrix) -> ComplexArray:
-    """Return (p, H+1, n) motions, harmonics that a point lacks being zero, whose first harmonics do not turn from point to point."""
+    """Return (p, H+1, n) motions with a continuous phase of the first harmonic; missing harmonics are zero."""
     most = max(len(m) for m in motions)
     out = np.zeros((len(motions), most, motions[0].shape[1]), dtype=complex)
     for i, own in enumerate(motions):

@@ -1,18 +1,17 @@
 """Validity of the single-mode assumption: linear response of the other modes under the same force.
 
-All other modes are there as the linear ones that they are with the contacts stuck: what the whole linear structure answers, less the part of the
-linear mode. They answer to what the motion of the backbone leaves of the load. As long as nothing slips they are added, and the sum is the
-exact response. Where contacts slip they feel a motion that the backbone does not know, and the amplitude of a resonance is off by about
+The other modes are linear, with stuck contacts. Their response is the response of the linear structure without the followed mode, to the force that
+remains in the equations of motion of the backbone. While nothing slips, the sum of both is the exact response. Where contacts slip, the other modes
+move the contacts too, which the backbone neglects. The amplitude of a resonance is then wrong by about
 
     foreign = m max(1 - S, 1/5) + (ζ / δ)² ,
 
-with m the motion of the others over that of the mode, in the output or in the gaps of the contacts; S the growth ``d ln a / d ln level``, which is
-small where slip holds the gap; ζ the damping ratio and δ the relative distance to the next frequency. `docs/theory/modal_synthesis.md` says how
-often it was.
+where m is the motion of the other modes over the followed mode, in the output or in the contact gaps; S the growth ``d ln a / d ln level``, which is
+small where slip limits the gap; ζ the damping ratio; and δ the relative distance to the next frequency. `docs/theory/modal_synthesis.md` compares this
+estimate with solutions.
 
-At a peak the mode is large and the other modes are small beside it; away from it they may be a fifth of it. As long as nothing slips they are
-added, and the sum is exact. Where contacts slip, they feel the other modes too. A mode whose amplitude follows the load steeply, as on the flank
-of a peak that slip softens, makes much of that little. `along` says where one mode dominates.
+At a peak the other modes are small beside the followed one; away from it they may reach a fifth. Where the amplitude grows steeply with the load, as on
+the flank of a peak that slip softens, a small motion of the other modes has a large effect. `along` returns where one mode dominates.
 """
 
 from dataclasses import dataclass, replace
@@ -31,18 +30,18 @@ from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, at_resonance
 
 WHOLE = 300  # coordinates up to which all motions count
-LOWEST = 80  # of more, so many modes and the static answer to the force
-ACROSS = 0.02  # of ln a, over which the growth with the level is taken
+LOWEST = 80  # number of modes of larger structures; the static response to the force is added
+ACROSS = 0.02  # half the interval of ln a for the growth with the level
 WIDTHS = 2.0  # half-widths of a peak within which the other modes may move it
-HELD = 0.2  # least share of the others that counts
+HELD = 0.2  # least share of the other modes that counts
 CHANGES = 1e-3  # relative change of frequency or damping from the linear mode that counts as slip
-ALONE = 0.05  # relative, of the motion of the others and of what the contacts make of it
-DIFFERENCE = 1e-4  # of the place, over which the amplitude follows the load
+ALONE = 0.05  # largest share of the other modes, and of their effect through the contacts, where one mode dominates
+DIFFERENCE = 1e-4  # step of the position for the derivative of the amplitude by the load
 
 
 @dataclass(frozen=True, eq=False)
 class OtherModes:
-    """The linear structure with its contacts stuck, less the linear mode that the backbone begins with.
+    """Modes of the linear structure with stuck contacts, without the mode in which the backbone begins.
 
     Parameters
     ----------
@@ -51,7 +50,7 @@ class OtherModes:
     poles
         (m,) eigenvalues of the structure, 1/s.
     left, right
-        (m, n) and (n, m): a force f answers with ``right diag(1 / (iΩ - poles)) left f``.
+        (m, n) and (n, m): the response to a force f is ``right diag(1 / (iΩ - poles)) left f``.
     """
 
     oscillator: ModalOscillator
@@ -78,12 +77,12 @@ class OtherModes:
 
 @dataclass(frozen=True)
 class Isolation:
-    """How isolated a mode is at a resonance.
+    """Isolation of a mode at a resonance.
 
     Parameters
     ----------
     output, gaps
-        Motion of the other modes over that of the mode: of the output, and of the gaps of the contacts.
+        Motion of the other modes over the followed mode, in the output and in the contact gaps.
     distance
         Relative distance of the next frequency.
     overlap
@@ -93,7 +92,7 @@ class Isolation:
     harmonics
         Higher harmonics over the first, in the output.
     linear
-        Whether nothing slips: then the other modes are added, and the response is exact.
+        Whether nothing slips: then the sum with the other modes is exact.
     """
 
     output: float
@@ -136,10 +135,9 @@ def other_modes(oscillator: ModalOscillator) -> OtherModes:
 
 
 def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
-    """Return the (p, n) residual forces of the equations of motion at synthesised points, N, which are zero along the mode itself.
+    """Return the (p, n) residual forces of the equations of motion at synthesised points, N; their modal component is zero.
 
-    Motions of the backbone have mass-proportional damping instead of the load, and another frequency. The two act differently on
-    the other modes.
+    Backbone motions have mass-proportional damping instead of the load, and another frequency. Both act on the other modes.
     """
     structure = oscillator.backbone.system.structure.of_harmonic(1)
     here = oscillator.at(found.place)
@@ -152,12 +150,12 @@ def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
 
 @by_one_thread
 def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
-    """Return how isolated a mode is at a resonance.
+    """Return the isolation of a mode at a resonance.
 
     Parameters
     ----------
     others
-        The modes beside it.
+        The other modes.
     resonance
         Resonance of the synthesis.
     dof
@@ -185,7 +183,7 @@ def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
 
 
 def growth(oscillator: ModalOscillator, place: float) -> float:
-    """Return ``d ln a / d ln level`` of the resonances at a place; infinite where two of them meet."""
+    """Return ``d ln a / d ln level`` of the resonance at a position; infinite where two resonances meet."""
     ends = np.clip([place - ACROSS, place + ACROSS], *oscillator.ends)
     level = np.log(oscillator.needed(ends))
     size = np.log(oscillator.at(ends).amplitude)
@@ -194,7 +192,7 @@ def growth(oscillator: ModalOscillator, place: float) -> float:
 
 
 def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) -> bool:
-    """Whether the mode is still the linear one at `factor` times the amplitude of a place."""
+    """Whether the mode is still linear at `factor` times the amplitude of a position."""
     last = min(place + float(np.log(factor)), oscillator.ends[1])
     looked = np.append(oscillator.place[oscillator.place <= last], last)
     here = oscillator.at(looked)
@@ -205,7 +203,7 @@ def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) ->
 
 @by_one_thread
 def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> ComplexArray:
-    """Return (p, k) first harmonics of dofs with the share of the other modes, in the phase of the load, m."""
+    """Return (p, k) first harmonics of dofs with the other modes included, in the phase of the load, m."""
     own = others.oscillator
     motion = own.first(found.place)[:, dofs] * np.exp(1j * found.phase)[:, None]
     rows = np.zeros((dofs.size, own.backbone.system.structure.n))
@@ -215,7 +213,7 @@ def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> Compl
 
 @by_one_thread
 def peak_with_others(others: OtherModes, curve: Synthesised, found: Resonance, dof: int) -> tuple[float, float]:
-    """Return the largest amplitude of a dof, m, with the share of the other modes, and its frequency, rad/s.
+    """Return the peak amplitude of a dof with the other modes included, m, and its frequency, rad/s.
 
     Parameters
     ----------
@@ -275,11 +273,11 @@ class Along:
     amplitude
         Amplitude of the output in the first harmonic, other modes included, m.
     share
-        Motion of the other modes over that of the mode, the larger value of output and contact gaps.
+        Motion of the other modes over the followed mode, the larger value of output and contact gaps.
     change
-        Approximate relative change of the amplitude at its frequency by the effect of the other modes on the contacts.
+        Approximate relative change of the amplitude, because the other modes move the contacts.
     linear
-        Whether nothing slips: the response is exact.
+        Whether nothing slips: then the response is exact.
     """
 
     amplitude: FloatArray
@@ -289,7 +287,7 @@ class Along:
 
     @property
     def alone(self) -> BoolArray:
-        """Where nothing slips, or both numbers are at most `ALONE`."""
+        """Whether nothing slips, or share and change are at most `ALONE`."""
         return self.linear | ((self.share <= ALONE) & (self.change <= ALONE))
 
 
@@ -316,7 +314,7 @@ def along(others: OtherModes, found: Synthesised, dof: int) -> Along:
             np.linalg.norm(beside[:, k], axis=1) / np.linalg.norm(moves[:, k], axis=1)
             for k in (slice(1), slice(1, None))
         ]
-    # gaps of the mode and the others together, as amplitudes of the mode alone
+    # amplitude of the mode alone that has the gaps of all modes together
     size = np.sum(np.abs(moves[:, 1:]) ** 2, axis=1)
     both = np.abs(1.0 + np.sum(moves[:, 1:].conj() * beside[:, 1:], axis=1) / size)
     felt = _needs(own, found.place + np.log(both), found.omega)
@@ -339,7 +337,7 @@ def slips_from(oscillator: ModalOscillator) -> float:
 
 
 def _needs(oscillator: ModalOscillator, place: FloatArray, omega: FloatArray) -> FloatArray:
-    """Return the modal stiffness at frequencies, as a size."""
+    """Return the absolute modal dynamic stiffness at positions and frequencies."""
     here = oscillator.at(np.clip(place, *oscillator.ends))
     return np.asarray(np.abs(here.stiffness(omega)))
 

@@ -1,11 +1,11 @@
-"""Nonlinear modal synthesis: the forced response at any level from one backbone, without solving the equations of motion again.
+"""Nonlinear modal synthesis: forced response at any load level from one backbone, without solving the equations of motion again.
 
-At each amplitude of the backbone the frequencies at which a force of a level keeps it are the roots of a polynomial of fourth degree in Ω (see
-`one_mass`): one below and one above the resonance. Where the amplitude needs more than the level at every frequency there is none, so that the
-places at which the least level needed crosses the level are the peaks, and several stretches of the backbone below it are several
-curves: the first is that on which the machine comes up from small amplitudes, the others are detached.
+At each amplitude of the backbone, the frequencies at which a load level sustains it are roots of a quartic polynomial in Ω (see `sdof_oscillator`):
+one below and one above the resonance. There is no root where the amplitude needs a higher level at every frequency. Peaks therefore lie where the
+smallest level that sustains the amplitude equals the load level. Each stretch of the backbone below the load level is a curve: the first contains small
+amplitudes, the others are detached.
 
-Design curves follow from the same backbone: the peak over the level of the load, and over anything that scales like it.
+Design curves follow from the same backbone: the peak over the load level, and over quantities that scale like it.
 """
 
 from dataclasses import dataclass, replace
@@ -21,36 +21,36 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
-POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
-REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root
-DIFFERENCE = 1e-5  # of the place, over which derivatives are taken
-PEAK_PLACE_RTOL = 1e-9  # of the place, in finding a peak
+POINTS = 161  # amplitudes of a curve, each with a frequency on either side of the resonance
+REAL = 1e-6  # relative imaginary part up to which a root counts as real: at a double root, rounding errors enter as a square root
+DIFFERENCE = 1e-5  # step of the position for derivatives
+PEAK_PLACE_RTOL = 1e-9  # tolerance of a peak's position
 TWICE = 2.0
 CONTACT_FORCE_RTOL = 1e-9  # relative difference of contact forces that counts as none
 
 
 @dataclass(frozen=True, eq=False)
 class Synthesised:
-    """The response at one level, its curves one after the other, all arrays (p,).
+    """Response at one level, curve by curve, all arrays (p,).
 
     Parameters
     ----------
     level
         Factor on the harmonic load.
     place
-        On the backbone.
+        Position on the backbone.
     omega
         Frequency, rad/s, in the order of the curve.
     amplitude
         Modal amplitude, kg^0.5 m.
     phase
-        Phase of the motion relative to that of the backbone, rad.
+        Phase of the motion relative to the backbone, rad.
     curve
         0: the curve from small amplitudes; 1 and so on: detached curves.
     stable
         Whether slow changes of amplitude and phase of this mode decay.
     resonances
-        Points at which the sides of the curves meet.
+        Points at which both sides of a curve meet.
     """
 
     level: float
@@ -64,7 +64,7 @@ class Synthesised:
 
     @property
     def peaks(self) -> "tuple[Resonance, ...]":
-        """The resonances that are peaks, one of each curve."""
+        """Peaks, one for each curve."""
         return tuple(r for r in self.resonances if r.top)
 
     def alone(self, curve: int) -> "Synthesised":
@@ -83,20 +83,20 @@ class Synthesised:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Point at which both sides of a response curve meet: the level is the smallest for its amplitude.
+    """Point at which both sides of a response curve meet: no smaller level sustains its amplitude.
 
     Parameters
     ----------
     level
         Factor on the harmonic load.
     place
-        On the backbone.
+        Position on the backbone.
     omega
         Frequency, rad/s.
     amplitude
         Modal amplitude, kg^0.5 m.
     top
-        Whether the curve lies below it: a peak. Otherwise it is the least amplitude of a detached curve.
+        Whether it is a peak. Otherwise it is the smallest amplitude of a detached curve.
     """
 
     level: float
@@ -108,7 +108,7 @@ class Resonance:
 
 @by_one_thread
 def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
-    """Return the resonances of a level in the order of the backbone; none if the level exceeds that at its end.
+    """Return the resonances of a level in the order of the backbone.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) 
     level
         Factor on the harmonic load, above zero.
     points
-        Amplitudes of a curve, each with a frequency on either side of the resonance.
+        Number of amplitudes of a curve, each with a frequency on either side of the resonance.
     """
     found = resonances(oscillator, level)
     meets = [r.place for r in found]
@@ -175,7 +175,7 @@ def at_resonance(oscillator: ModalOscillator, found: Resonance) -> Synthesised:
 
 @by_one_thread
 def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> FloatArray:
-    """Return the places of the steady motions at a frequency, rad/s, in the order of the backbone."""
+    """Return the positions of the steady motions at a frequency, rad/s, in the order of the backbone."""
     table = oscillator.table
 
     def more(place: FloatArray) -> FloatArray:
@@ -191,7 +191,7 @@ def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> Float
 
 @by_one_thread
 def free_motions(oscillator: ModalOscillator) -> FloatArray:
-    """Return the places of limit cycles: zeros of the damping, which with aerodynamic forces may be negative."""
+    """Return the positions of limit cycles: zeros of the damping, which aerodynamic forces may make negative."""
     table = oscillator.table
     ratio = oscillator.at(table).ratio
     at = np.flatnonzero(ratio[:-1] * ratio[1:] < 0.0)
@@ -211,8 +211,8 @@ def _curve(
     closes_below: bool,
     closes_above: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return places and frequencies of a stretch of the backbone: up on the lower side of the resonance, and down on the upper one."""
-    # both sides meet like a root, so that places stand close where they do
+    """Return positions and frequencies of a stretch of the backbone: up below the resonance, then down above it."""
+    # the frequency varies like a square root where both sides meet, so positions are dense there
     share = np.linspace(0.0, 1.0, points)
     if closes_below and closes_above:
         share = 0.5 - 0.5 * np.cos(np.pi * share)
@@ -235,7 +235,7 @@ def _curve(
 
 
 def _sides(oscillator: ModalOscillator, level: float, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the frequencies below and above the resonance at which the level keeps the amplitudes; NaN where there is none."""
+    """Return the frequencies below and above the resonance at which the level sustains the amplitudes; NaN where there is none."""
     here = oscillator.at(place)
     q = here.polynomial()
     q[:, 4] -= (level * np.abs(here.force) / here.amplitude) ** 2
@@ -252,7 +252,7 @@ def _sides(oscillator: ModalOscillator, level: float, place: FloatArray) -> tupl
 
 
 def _stable(oscillator: ModalOscillator, place: FloatArray, omega: FloatArray) -> BoolArray:
-    """Return where slow changes of amplitude and phase die out; see `passage` for their equation."""
+    """Return whether slow changes of amplitude and phase decay at each point; see `passage` for their equation."""
     first, last = oscillator.ends
     low = np.clip(place - DIFFERENCE, first, last)
     high = np.clip(place + DIFFERENCE, first, last)
@@ -266,7 +266,7 @@ def _stable(oscillator: ModalOscillator, place: FloatArray, omega: FloatArray) -
     with np.errstate(divide="ignore", invalid="ignore"):
         by_size = turned / grown
     rate = 1j * omega + here.viscous + here.eigenvalue
-    # of ln a and of the phase: d/dt (ln a + iθ) = (level f exp(-iθ) / a - D) / rate
+    # d/dt (ln a + iθ) = (level f exp(-iθ) / a - D) / rate
     by_amplitude, by_phase = -stiffness * by_size / rate, -1j * stiffness / rate
     trace = by_amplitude.real + by_phase.imag
     determinant = by_amplitude.real * by_phase.imag - by_amplitude.imag * by_phase.real
@@ -274,7 +274,7 @@ def _stable(oscillator: ModalOscillator, place: FloatArray, omega: FloatArray) -
 
 
 def checked_level(level: float) -> float:
-    """Return a factor on the load, which has to be above zero."""
+    """Return a load level, after checking that it is above zero."""
     if not 0.0 < level < np.inf:
         raise input_error("modal_synthesis: levels", f"holds {level}", "Give factors above zero.")
     return level
@@ -308,15 +308,15 @@ class PeakCurve:
     def per_load(self) -> FloatArray:
         """Peak over level, m.
 
-        For homogeneous contact laws this is also the curve over a damper's static load: s times the static load under the same vibration
-        load gives s times the peak of level 1/s.
+        For homogeneous contact laws this is also the curve over a damper's static load: with s times the static load and the same
+        vibration load, the peak is s times the peak of level 1/s.
         """
         return self.amplitude / self.level
 
 
 @by_one_thread
 def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
-    """Return the resonances of all levels from the backbone alone: each of its points is the resonance of one level."""
+    """Return the resonances of all levels from the backbone: each of its points is the resonance of one level."""
     after = oscillator.table >= oscillator.begins
     place, level = oscillator.table[after], oscillator.needed_in_table[after]
     here = oscillator.at(place)
@@ -327,8 +327,8 @@ def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
 def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = None) -> bool:
     """Whether contact forces are proportional to displacements: laws without a preload, gap or limit of their own.
 
-    A factor on static and vibration loads is then a factor on the motion, and one backbone serves all static loads. The motion of the
-    largest amplitude is tested.
+    The motion is then proportional to static and vibration loads together, and one backbone serves all static loads. The test uses the
+    motion of largest amplitude.
     """
     backbone = oscillator.backbone
     balance = (how or Discretisation()).balance(backbone.system, oscillator.load, np.array([backbone.dof]))
