@@ -1,1 +1,1 @@
-"""The forced response: branches, repeats with more harmonics, peaks."""
+"""Forced response: branches, repeats with more harmonics, peaks."""

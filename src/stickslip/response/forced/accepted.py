@@ -7,17 +7,17 @@ import numpy as np
 from stickslip.response.forced.choices import Stage
 from stickslip.response.forced.problem import ForcedPoint
 
-# relative difference of two vibrations below which a branch has come back to the other
+# relative difference of two vibrations below which a branch has returned to the low-order one
 ALIKE = 0.25
 AUDITS: tuple[Stage, ...] = ("audit", "check", "compared")
 
 
 def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the points of the response, each with its low-order point (the same point where it was not repeated).
+    """Return the points of the response, each with the low-order point that it repeats.
 
     They are in the order of the branch: points of the first passage, replaced by their repeats. Where some repeats of a run failed, the
-    branch with many harmonics replaces the run, if it reached the other side. Remaining gaps are filled from time integration. Peak
-    points come last.
+    branch with many harmonics replaces the run, if it reached the other side. Time integration fills remaining gaps. Peak points come
+    last.
     """
     pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
     if any(p.stage == "point" for p in points):
@@ -28,7 +28,7 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     for p in points:
         if p.stage == "peak" and not (p.omega in best and best[p.omega].converged and _fewer(p, best[p.omega])):
             best[p.omega] = p
-    # a peak that was solved again with more harmonics takes the place of what it was
+    # a peak solved again with more harmonics replaces its earlier point
     again = {omega: p for omega, p in best.items() if p.converged}
     pairs = [(again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low) for p, low in pairs]
     in_time = {p.omega: p for p in points if p.stage == "in_time"}
@@ -48,7 +48,7 @@ def audits_by_frequency(points: Sequence[ForcedPoint]) -> dict[float, list[Force
 
 
 def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the points of the published passages, each with that of the first passage which it repeats or is."""
+    """Return the points of the published passages, each with its point of the first passage, which may be the same one."""
     low = points_of_branch(points, "low")
     high = {p.index: p for p in points if p.stage == "high"}
     kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
@@ -64,7 +64,7 @@ def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, Force
 
 
 def points_of_branch(points: Sequence[ForcedPoint], stage: Stage) -> list[ForcedPoint]:
-    """Return the points of a branch, by their `stage`: those that no later point replaced."""
+    """Return the points of a branch, by their `stage`, without replaced ones."""
     branch: list[ForcedPoint] = []
     for one in points:
         if one.stage == stage:
@@ -100,15 +100,15 @@ def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[
 
 
 def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
-    """Return the end frequency, rad/s, of a branch through a run of repeats: that of the next quiet point, or of the last point."""
+    """Return the end frequency, rad/s, of a branch through a run of repeats: at the next point without an alert, or at the last point."""
     return low[min(last + 1, len(low) - 1)].omega
 
 
 def replaced(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> int:
     """Return the index of the last point of the first passage that a branch replaces; -1 if it replaces none.
 
-    A branch replaces its run if it reaches the frequency and the motion of the next quiet point. A folded branch may pass that
-    frequency on other sheets. It then continues to the end of the range and replaces all points that follow.
+    A branch replaces its run if it reaches the frequency and the motion of the next point without an alert. A folded branch may pass
+    that frequency on another sheet. It then continues to the end of the range and replaces all points that follow.
     """
     if not branch or not branch[-1].converged:
         return -1

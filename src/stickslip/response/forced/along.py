@@ -1,4 +1,4 @@
-"""The forced response along a branch with adaptive harmonics: raised until the error is small, audited, lowered again."""
+"""Forced response along a branch with adaptive harmonics: raised until the error is small, audited, lowered again."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,15 +27,15 @@ from stickslip.solve.newton_method import Solution, newton
 
 _Inverse = Callable[[FloatArray], FloatArray | None]
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
-# factors on predictions, with the fewest harmonics and with more: motions predicted to be right by less than that were wrong at times
+# safety factors on predictions, with the fewest harmonics and with more: smaller ones accepted some wrong motions
 SAFETY = (2.0, 1.25)
-SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
-START = 0.3  # share of the threshold above which what was predicted is kept as a start
-ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
-AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
-DOUBT = 2.0  # times the second step, by which a prediction may be off
-NEARLY = 8  # iterations to a solution with fewer harmonics that is near
-SAME_SHEET_RTOL = 0.3  # relative difference of motions that stand on the same sheet
+SMALL = 100.0  # number of unknowns at which half the work of a Newton step grows with the unknowns
+START = 0.3  # share of the threshold above which a predicted motion is kept as a start
+ROUGHLY = 1e-3  # relative residual of the predicting step by an iterative solver
+AGREE = 0.5  # share of the threshold by which neighbouring levels may differ: the next levels add to it
+DOUBT = 2.0  # uncertainty of a prediction over the second Newton step
+NEARLY = 8  # iterations to a nearby solution with fewer harmonics
+SAME_SHEET_RTOL = 0.3  # relative difference up to which motions count as on the same sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class ForcedCurve:
 
     @property
     def levels(self) -> int:
-        """Number of supports."""
+        """Number of levels."""
         return len(self.supports)
 
     def problem(self, level: int) -> Balance:
@@ -71,20 +71,20 @@ class ForcedCurve:
         return self.forced.following(self.problem(level))
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
-        """Return unknowns of one level as those of another; missing harmonics are zero."""
+        """Convert unknowns from one level to another; missing harmonics are zero."""
         if level == to:
             return x
         return self.problem(to).unknowns(self.problem(level).coefficients(x))
 
     def starts(self, known: Followed, to: int) -> list[FloatArray]:
-        """Return the start that the judgement predicts for the next level, and the solution itself."""
+        """Return the starts for a level: the prediction of the judgement, if there is one, and the solution itself."""
         own = [self.lifted(known.point.x, known.level, to)]
         if known.judged.start is not None and to == known.level + 1:
             own.insert(0, self.problem(to).unknowns(known.judged.start))
         return own
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at a frequency without a branch to it."""
+        """Solve at a frequency that no branch reached."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
             forced.system,
@@ -96,7 +96,7 @@ class ForcedCurve:
         )
 
     def cost(self, level: int) -> float:
-        """Return the work of a Newton step, which grows with the unknowns: small systems are factorised, large ones solved by iteration."""
+        """Return the relative work of a Newton step; it grows linearly, as large systems are solved by iteration."""
         return 1.0 + self.problem(level).size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
@@ -121,13 +121,13 @@ class ForcedCurve:
         return Judged(bound, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step, point: Point) -> Judged:
-        """Predict the error by a Newton step with the harmonics of the next level; the change by a second step is its uncertainty."""
+        """Predict the error by a Newton step with the harmonics of the next level; a second step gives its uncertainty."""
         more, following = self._reference(level, point), self.supports[level + 1]
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
         kept: list[tuple[_Inverse | None, float]] = []
 
         def solve(jac: Jacobian, right: FloatArray) -> FloatArray | None:
-            # two right sides alone: what is solved by products is not put together for them
+            # for two right sides alone an operator is not assembled
             inverse = factorised(linear, jac) if is_factorised(jac) else partial(linear.solve, jac)
             kept.append((inverse, float(np.linalg.norm(right))))
             return None if inverse is None else inverse(right)
@@ -143,7 +143,7 @@ class ForcedCurve:
         return Judged(bound, (), start)
 
     def _reference(self, level: int, point: Point) -> HarmonicBalance:
-        """Return the problem towards which a solution of a level is judged: with the harmonics of the next one, the judging set, and those at which it rings."""
+        """Return the reference problem of a level: with the harmonics of the next one, the judging set, and harmonics that excite a resonance."""
         own, following = with_stiffness(self.problem(level)), self.supports[level + 1]
         wanted = {*following, *judging_set_of(own), *ringing(own, point.x, point.p)}
         if wanted <= set(following):
@@ -156,7 +156,7 @@ class ForcedCurve:
     def _doubt(
         self, step: Step, more: HarmonicBalance, x: FloatArray, inverse: _Inverse | None, residual: float
     ) -> float:
-        """Return the uncertainty of a prediction: contacts that change their states can make the next step as large or larger."""
+        """Return the uncertainty of a prediction: where contacts change their states, the next step may be as large or larger."""
         rest = more.linearise(x, step.omega).residual
         chord = None if inverse is None else inverse(-rest)
         if chord is None or not float(np.linalg.norm(rest)) <= residual:
@@ -205,7 +205,7 @@ class ForcedCurve:
         return self.forced.difference(omega, a, b)[0]
 
     def stored(self, found: Followed) -> Followed:
-        """Return a solution as restored from the journal."""
+        """Return a solution in the form in which the journal restores it."""
         return of_forced(self, to_forced(self, found))
 
     def stage_of(self, found: Followed) -> Stage:
@@ -221,7 +221,7 @@ class ForcedCurve:
 
 @lru_cache(maxsize=4)
 def _height(curve: ForcedCurve, found: Followed) -> float:
-    """Return a height; kept, because each point is compared with two neighbours."""
+    """Return a height; cached, because each point is compared with two neighbours."""
     q = curve.problem(found.level).coefficients(found.point.x)
     return curve.forced.amplitude_of(found.p, q)
 
@@ -239,7 +239,7 @@ def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Ite
     Yields
     ------
     ForcedPoint
-        Points not in `done`, their stage the kind of `stickslip.response.continuation.adaptive_continuation.Followed`.
+        Points not in `done`; the stage is the kind of `stickslip.response.continuation.adaptive_continuation.Followed`.
     """
     curve = ForcedCurve(problem, problem.sweep.supports)
     yield from followed(curve, route_of(problem), done)
@@ -253,7 +253,7 @@ def route_of(problem: ForcedProblem) -> Route:
 
 
 def followed(curve: ForcedCurve, route: Route, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
-    """Follow a curve from and to points of the response."""
+    """Follow a curve, and convert its points from and to points of the response."""
     known = [of_forced(curve, p) for p in done]
     for found in follow(curve, route, known):
         yield to_forced(curve, found)
@@ -266,7 +266,7 @@ def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -
 
 @lru_cache(maxsize=2)
 def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint:
-    """Return the argument unchanged; kept since the continuation restarts from stored points."""
+    """Return `to_forced`, cached: the same object serves each time, since the continuation restarts from stored points."""
     point, judged = found.point, found.judged
     return forced_point(
         curve.problem(found.level), point.solution, stage, found.index, point.p, found.seconds, point, judged

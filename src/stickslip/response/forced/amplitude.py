@@ -10,8 +10,8 @@ from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 
-SAMPLES_A_HARMONIC = 16  # of a period, from the highest of which Newton's method goes on to the extreme
-REFINED = 4  # of its steps
+SAMPLES_A_HARMONIC = 16  # in a period; Newton's method starts at the highest sample
+REFINED = 4  # Newton steps
 
 
 def amplitudes(motion: ComplexArray, driven: Harmonics, of: AmplitudeOf) -> FloatArray:
@@ -24,8 +24,8 @@ def amplitudes(motion: ComplexArray, driven: Harmonics, of: AmplitudeOf) -> Floa
     driven
         Harmonics that the load drives.
     of
-        ``first``: amplitude of the driven harmonics, for several their norm. ``half_peak_to_peak``: half the distance from the smallest
-        to the largest displacement in a period. ``rms``: root mean square about the mean.
+        ``first``: amplitude of the driven harmonic, or the norm of several. ``half_peak_to_peak``: half the distance from the smallest to
+        the largest displacement in a period. ``rms``: root mean square about the mean.
     """
     if of == "first":
         rows = [h for h in driven if h < len(motion)]
@@ -54,9 +54,9 @@ def extremes(motion: ComplexArray) -> FloatArray:
 def error_measure(
     system: System, sweep: Sweep, driven: Harmonics, dofs: IntArray, places: IntArray | None = None
 ) -> ErrorMeasure:
-    """Return the error measure over `dofs`; `places` are their positions among the compared dofs, if these are not all dofs.
+    """Return the error measure over `dofs`; `places` are their positions among the compared dofs, unless all dofs are compared.
 
-    Where the amplitude includes more than the driven harmonics, all harmonics except the mean count.
+    If the amplitude includes more than the driven harmonics, all harmonics except the mean count.
     """
     at = dofs if places is None else places
     chosen = driven if sweep.error_harmonics is None else tuple(sweep.error_harmonics)

@@ -1,4 +1,4 @@
-"""The forced response by shooting: periodic motions in time, each frequency begun at the motion of the one before."""
+"""Forced response by shooting: periodic motions in time; each frequency starts from the previous motion."""
 
 from collections.abc import Iterator, Sequence
 from time import perf_counter
@@ -33,28 +33,28 @@ ENDED = {
 def shooting_response(
     system: System, load: HarmonicLoad, sweep: Sweep, stepping: TimeStepping, done: Sequence[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:
-    """Find the periodic motion at every frequency of `sweep.grid` by shooting, then at a few about the peak.
+    """Find the periodic motion at every frequency of `sweep.grid` by shooting, then at a few near the peak.
 
     Parameters
     ----------
     system, load
         Structure, contacts and outputs; forces on all dofs, N.
     sweep
-        Frequencies; its harmonics are those that points report.
+        Frequencies, and harmonics to report.
     stepping
-        Steps of a period, tolerance, most periods.
+        Steps in a period, tolerance, largest number of periods.
     done
         Points of an interrupted run, in their order. They are not computed again, and the remaining points are the same.
 
     Yields
     ------
     ForcedPoint
-        Points not in `done`: ``low`` along the sweep, ``peak`` about the peak.
+        Points not in `done`: ``low`` along the sweep, ``peak`` near the peak.
 
     Raises
     ------
     InputError
-        If the system has no form in time: a tuned wheel, complex matrices, rigid contacts, a singular mass matrix.
+        If the system has no equations in time: a tuned wheel, complex matrices, rigid contacts, a singular mass matrix.
     """
     problem = forced_problem(system, load, sweep)
     left, solved, last = iter(done), list[ForcedPoint](), None
@@ -84,7 +84,7 @@ def shooting_response(
 def _shot_point(
     problem: ForcedProblem, omega: float, last: ForcedPoint | None, stepping: TimeStepping, stage: Stage, index: int
 ) -> ForcedPoint:
-    """Return the motion at a frequency, begun at that of another point; without one with all contacts stuck."""
+    """Return the motion at a frequency, started from another point's motion, or else with all contacts stuck."""
     began, system, linear = perf_counter(), problem.system, problem.low.linear
     there = system.at(omega)
     retained = np.asarray(linear.retained)
@@ -142,7 +142,7 @@ def _begun(system: System, last: ForcedPoint) -> TransientStart:
 
 
 def _stuck(problem: ForcedProblem, omega: float) -> TransientStart | None:
-    """Return the state of the vibration with all contacts stuck; None, which is rest, where there is none."""
+    """Return the state of the vibration with all contacts stuck; None (rest) without one."""
     balance, interface = problem.low, problem.system.interface
     try:
         coefficients = balance.coefficients(bonded_start(balance, omega, problem.system))

@@ -1,4 +1,4 @@
-"""Options of a forced response: names and limits, without what computes, so that a study file is judged at once."""
+"""Names and limits of options of a forced response, free of solver imports, so that study files are checked quickly."""
 
 from typing import Literal
 
@@ -9,6 +9,6 @@ Rescue = Literal["all", "in_time", "off"]
 Stage = Literal[
     "low", "high", "branch", "peak", "point", "audit", "trial", "found", "check", "in_time", "settled", "compared"
 ]
-RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
+RUNGS = (5, 9, 15, 25, 41)  # highest harmonic of each level of "auto"
 PUBLISHED = 5  # highest harmonic of the repeats in the papers
-SELECTION = "guarded_alert"  # what chooses harmonics where nothing else is said
+SELECTION = "guarded_alert"  # default selection of harmonics

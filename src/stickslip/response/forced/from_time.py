@@ -1,4 +1,4 @@
-"""Frequencies without a solution, taken from time integration where that becomes periodic."""
+"""Solution of failed frequencies from time integration that becomes periodic."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
@@ -19,23 +19,23 @@ from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung, Status
 
-MOST_COORDINATES = 600  # half a second a period, or more
-PATIENCE = 40  # Newton steps, at least: the start is near
-MORE = (2, 4, 6, 10)  # harmonics more than asked for
+MOST_COORDINATES = 600  # larger structures need half a second for a period, or more
+PATIENCE = 40  # least number of allowed Newton steps: the start is near
+MORE = (2, 4, 6, 10)  # additional harmonics to try
 
 
 @dataclass(frozen=True)
 class Marched:
     """Time integration from rest; see `stickslip.response.time.repeating.Repetition`.
 
-    Values called finer come from a continuation with half the step; NaN where it was not needed.
+    Fields with ``finer`` come from a second integration with half the step; NaN where it was not needed.
 
     Attributes
     ----------
     periods, steps, angle
-        Number of periods, steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
+        Number of periods; steps in a period; phase angle per step of the fastest contact that opens or closes, rad.
     every, finer_every
-        Number of periods after which the motion repeats; 0: it does not repeat.
+        Number of excitation periods after which the motion repeats; 0: it does not repeat.
     change
         Relative change of the harmonics of all gaps over the last period.
     wander, finer_wander
@@ -158,16 +158,17 @@ def _told(seen: Repetition) -> Marched:
 
 
 def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
-    """Return the orders to try: the requested ones, then more, since a few more harmonics may restore a solution that was lost at a fold."""
+    """Return the orders to try, the requested one first; a few more harmonics may restore a solution lost at a fold."""
     most = problem.sweep.cap if problem.sweep.auto else lost.order + MORE[-1]
     more = [lost.order + m for m in MORE if lost.order + m <= most]
     return [lost.order, *more] if is_full(lost.support) else [lost.order]
 
 
 def _solved(problem: ForcedProblem, lost: ForcedPoint, seen: Repetition) -> list[tuple[Balance, Solution]]:
-    """Return attempts from the motion in time, of which the last counts; so close to the solution the natural-level Newton method continues where the residual stalls.
+    """Return Newton attempts from the motion in time, of which the last counts.
 
-    What settles too slowly to be told begins there, too, with the harmonics asked for.
+    Close to the solution the natural-level Newton method continues where the residual stalls. A motion that settles too slowly for a
+    verdict is tried with the requested harmonics only.
     """
     if seen.verdict == "not periodic" or not seen.finite:
         return []

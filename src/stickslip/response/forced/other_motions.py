@@ -1,4 +1,4 @@
-"""Other motions at frequencies of a response: Newton's method from linear vibrations, and the motion in time from rest."""
+"""Search for coexisting motions at frequencies of a response: Newton's method from linear vibrations, and time integration from rest."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,31 +21,31 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 NO_MOTION = (StickslipError, np.linalg.LinAlgError, FloatingPointError)
 ANOTHER = 0.01  # relative difference of amplitudes of two motions
 NEWTON_STEPS = 30  # from each start
-FEW = 3  # harmonics with which a start is tried first: most lead back to the motion that is known, or nowhere
-SAME_MOTION_RTOL = 1e-3  # relative difference of two motions with few harmonics that are one
-STEPS = 256  # of a period in time: Newton's method makes the motion exact
-PERIODS = 60  # marched from rest, at most
-FEWEST_PERIODS = 12  # fewer lead nowhere
-REPEATS = 1e-4  # change of the gaps' harmonics from period to period, of their size, that ends the march
-MARCHED = 0.4  # work of all marches over that of the solutions of the response
-# of a Newton step, and more for each of its unknowns: with contacts, as measured from 200 to 2200 unknowns
+FEW = 3  # highest harmonic of the first attempt: most starts lead to the known motion, or nowhere
+SAME_MOTION_RTOL = 1e-3  # relative difference up to which two motions with few harmonics are the same
+STEPS = 256  # time steps in a period: Newton's method makes the motion exact
+PERIODS = 60  # largest number of periods from rest
+FEWEST_PERIODS = 12  # smallest useful number of periods
+REPEATS = 1e-4  # relative change of the gaps' harmonics from period to period that ends the integration
+MARCHED = 0.4  # work of all time integrations over the work of the response's solutions
+# of a Newton step, constant and for each unknown; measured with contacts from 200 to 2200 unknowns
 NEWTON_FLOPS, FLOPS_AN_UNKNOWN = 3e6, 2e5
-JUDGED = 6  # Newton steps that the judgement of a solution takes as long as
-LONGER = 6.0  # a step in time lasts so many times longer than its operations do in a Newton step: with 734 coordinates six, with 140 two
+JUDGED = 6  # Newton steps that take as long as the judgement of a solution
+LONGER = 6.0  # time for an operation in a time step over a Newton step: six with 734 coordinates, two with 140
 
 
 @dataclass(frozen=True, eq=False)
 class OtherMotion:
-    """Motion beside that of the response at the same frequency.
+    """Another motion at a frequency of the response.
 
     Attributes
     ----------
     start
-        Start that led to it: ``contacts stuck``, ``contacts open`` or ``rest``.
+        Start of the search: ``contacts stuck``, ``contacts open`` or ``rest``.
     point
         The motion.
     amplitude, known
-        Amplitude of the motion, and of the response, m.
+        Amplitudes of the motion and of the response, m.
     """
 
     start: str
@@ -57,7 +57,7 @@ class OtherMotion:
 def other_motions(
     problem: ForcedProblem, points: Sequence[ForcedPoint], solved_points: Sequence[ForcedPoint], output: int
 ) -> Iterator[OtherMotion]:
-    """Yield motions whose amplitude differs from that of the response.
+    """Yield motions whose amplitude differs from the response.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def other_motions(
     points
         Points at whose frequencies to search, the most important one first.
     solved_points
-        All solved points. A time integration takes at most as much work as they did together.
+        All solved points. Their work limits the time integrations.
     output
-        Position of the output whose amplitude is compared.
+        Number of the output whose amplitude is compared.
     """
     if problem.system.interface.rigid or not problem.system.structure.reduced:
         return
@@ -95,9 +95,9 @@ def other_motions(
 
 
 def _linear_starts(problem: ForcedProblem, point: ForcedPoint, options: Newton) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the starts from linear vibrations that may lead to another motion, as scaled unknowns of the point's harmonics.
+    """Yield linear vibrations that may lead to another motion, as scaled unknowns of the point's harmonics.
 
-    Each is solved with few harmonics first. What leads nowhere then, or to the motion of the point with as few, is left out.
+    Each is solved with few harmonics first, and omitted if this fails or leads to the known motion.
     """
     whole = problem.balance(point.support)
     few = problem.balance(tuple(h for h in point.support if h <= max(FEW, *problem.driven)))
@@ -145,13 +145,13 @@ def _open(problem: ForcedProblem, balance: AnyBalance, omega: float) -> FloatArr
 def _from_rest(
     problem: ForcedProblem, balance: AnyBalance, omega: float, periods: int
 ) -> tuple[FloatArray | None, int]:
-    """March from rest under the static loads.
+    """Integrate in time from rest under the static loads.
 
     Returns
     -------
     tuple
-        Unknowns of the harmonics of the last period, None where the motion grows beyond all numbers or cannot be begun; and how many
-        periods were marched.
+        Unknowns for the harmonics of the last period, None if the motion overflows or has no initial state; and the number of integrated
+        periods.
     """
     system, linear = problem.system.at(omega), balance.linear
     interface = system.interface
@@ -180,7 +180,7 @@ def _from_rest(
 
 
 def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> float:
-    """Return the operations that all marches may take together; none where the structure is not marched."""
+    """Return the operations that all time integrations may take together; 0 if the structure has no equations in time."""
     structure = problem.system.structure
     if structure.wheel is not None or structure.of_harmonic(1).loss is not None:
         return 0.0

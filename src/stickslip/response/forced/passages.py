@@ -1,4 +1,8 @@
-"""Passages of the Jacobian Alert (Gastaldi & Berruti 2017, section 4.4): the double one, a branch with few harmonics and then the frequencies that need more; the single one, each frequency settled before the next."""
+"""Passages of the Jacobian Alert (Gastaldi & Berruti 2017, section 4.4).
+
+The double passage computes a branch with few harmonics, then repeats the frequencies that need more. The single passage settles each frequency
+before the next.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,13 +29,16 @@ from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Rung
 
-BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
-BRANCH_LENGTH = 8  # multiples of `Sweep.points` after which such a branch is given up
+BRANCH_SEEDS = 4  # starting points that are tried for a branch with many harmonics
+BRANCH_LENGTH = 8  # largest length of such a branch, in multiples of `Sweep.points`
 BACKWARD = 0.1  # share of the range by which it may leave the range
 PATIENT = 16  # iterations of a repeat from one start
-ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
-REPEAT_DISTANCE_RTOL = 1.0  # relative distance from a repeat beside a frequency within which it leads there at once
-NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
+# iterations of a repeat without accepted neighbours: damped steps of planar friction need them, and one success leads to the other repeats
+ISOLATED = 25
+REPEAT_DISTANCE_RTOL = (
+    1.0  # relative distance up to which a neighbouring repeat is used as a start without comparing others
+)
+NEIGHBOURS = 1  # starting points on each side for a failed repeat
 
 
 def double_passage(
@@ -39,8 +46,8 @@ def double_passage(
 ) -> Iterator[ForcedPoint]:
     """Compute the response with few harmonics, then repeat the points that need more.
 
-    A run of neighbouring repeats is solved forward, and failed repeats once more backward. Points that still fail are searched along
-    the branch with many harmonics, which may replace the run, then by homotopies.
+    A run of neighbouring repeats is solved forward, and failed repeats once more backward. Points that still fail are sought along the
+    branch with many harmonics, which may replace the run, then by homotopies.
 
     Parameters
     ----------
@@ -54,7 +61,7 @@ def double_passage(
     Yields
     ------
     ForcedPoint
-        Points not in `done`: of the first passage as ``low`` and ``found``, repeats as ``high``, those of a branch as ``branch``.
+        Points not in `done`: ``low`` and ``found`` of the first passage, ``high`` for repeats, ``branch`` for the branch.
     """
     curve = ForcedCurve(problem, (problem.low.harmonics,), raises=False)
     passage = [p for p in done if p.stage in ("low", "found")]
@@ -82,7 +89,7 @@ class _Second:
         passed = -1
         asked = {p.index: p for p in self.low if self.problem.asks_again(p)}
         for first, last in runs_of_repeats(asked):
-            if last <= passed:  # in the place of a branch that went on to the end of the range
+            if last <= passed:  # a branch to the end of the range replaced this run
                 continue
             run, branch = self.low[first : last + 1], list[ForcedPoint]()
             for order in (run, run[::-1]):
@@ -125,8 +132,8 @@ def _followed(
 ) -> Iterator[ForcedPoint]:
     """Follow the branch with many harmonics through a run of repeats that did not all converge, and append to `branch`.
 
-    Where the two orders differ much the branch may fold: then some frequencies have no solution near the low-order one, and only the
-    branch itself leads through. It ends at the next quiet point if it comes to its motion, else at the end of the range.
+    Where the two orders differ much, the branch may fold. Some frequencies then have no solution near the low-order one, and only the
+    branch leads through. It ends at the motion of the next point without an alert, or at the end of the range.
     """
     sweep, balance = problem.sweep, problem.high
     end = branch_end(low, last)
@@ -145,7 +152,7 @@ def _followed(
                 if point is None:
                     return
             else:
-                # another sheet at the frequency of the end: on to that of the range
+                # on another sheet at that frequency: continue to the end of the range
                 goal = low[-1].omega if any(p.omega == end for p in branch) else end
                 point = advance(balance, problem.branch_point(here), goal, following)
             seconds = perf_counter() - began
@@ -163,13 +170,13 @@ def _begun(problem: ForcedProblem, low: list[ForcedPoint], high: Mapping[int, Fo
     for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
         point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
         if point.solution.status.converged:
-            # a first passage that goes down, or was coming back from a fold, goes on downward
+            # keep the direction of the first passage, which may go down or return from a fold
             return reversed_point(point) if _goes_down(problem, low[seed.index]) else point
     return None
 
 
 def _goes_down(problem: ForcedProblem, point: ForcedPoint) -> bool:
-    """Whether frequencies fall beyond a point of the first passage; tangents of listed frequencies all show upward."""
+    """Whether frequencies fall after a point of the first passage; tangents of listed frequencies always point upward."""
     if problem.sweep.grid.size:
         return problem.sweep.direction == "down"
     return point.tangent.size > 0 and bool(point.tangent[-1] < 0.0)
@@ -182,9 +189,7 @@ def repeat(
     static: Callable[[], FloatArray] | None = None,
     branch: Sequence[ForcedPoint] = (),
 ) -> ForcedPoint:
-    """Solve one frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
-
-    The branch is followed from a neighbour no farther away than the next point.
+    """Solve one frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from the next point.
 
     Parameters
     ----------
@@ -193,11 +198,11 @@ def repeat(
     point
         Point of the first passage.
     others
-        Accepted points by index: repeats, and points of the first passage that need none.
+        Accepted points by index: repeats, and points of the first passage without an alert.
     static
-        Function that returns the (n_retained,) static equilibrium, m, for `solve_robustly` as the last attempt; None: no such attempt.
+        Function that returns the (n_retained,) static equilibrium, m, for a last attempt by `solve_robustly`; None: no such attempt.
     branch
-        Points of a branch with many harmonics, which gives starts where it passed the frequency.
+        Points of a branch with many harmonics, used as starts where it passed the frequency.
     """
     began = perf_counter()
     omega = point.omega
@@ -217,7 +222,7 @@ def repeat(
             detour = problem.along_branch(end, omega, balance, most // 4).solution
             spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
 
-    # between two points of the branch a solution is near: a dozen evaluations where other starts take a hundred
+    # between two points of the branch a solution is near: it takes a dozen evaluations, from other starts a hundred
     detours(passing(branch, point))
     beside = [] if found() else [p for p in near if abs(p.index - point.index) <= 1]
     alone = not beside and not branch and static is None
@@ -228,7 +233,7 @@ def repeat(
     if not found():
         starts = [*_predicted(problem, point), *(balance.unknowns(p.coefficients) for p in near)]
         nearest, *further = _nearest_first(balance, omega, q, starts, options)
-        # from q itself contacts change one by one, which leads to a solution from farther away than the measure tells
+        # from q, contacts change their states one by one, which converges from farther away than the measure suggests
         second = [start for start in further if start[1] is q] or further[:1]
         for start in [nearest] if alone else [nearest, *second]:
             spent.append(_from_start(balance, omega, start, options))
@@ -251,7 +256,7 @@ def _by_all(
     static: Callable[[], FloatArray] | None,
     steps: int,
 ) -> list[Solution]:
-    """Solve by all that may help, within so many Newton `steps`; not at all without a static equilibrium."""
+    """Solve by homotopies and other globalisations within the given Newton `steps`; no attempt without a static equilibrium."""
     if static is None:
         return []
     solution = solve_robustly(
@@ -266,7 +271,7 @@ def _by_all(
 
 
 def _leading(balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]) -> FloatArray | None:
-    """Return the repeat of a frequency beside this one, if it is near: comparing it with other starts costs more than it saves."""
+    """Return the repeat at a neighbouring frequency if it is near: comparing it with other starts costs more than it saves."""
     low = point.coefficients
     for known in beside:
         if known.order < balance.order:
@@ -280,10 +285,10 @@ def _leading(balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]
 def _nearest_first(
     balance: Balance, omega: float, q: FloatArray, others: Sequence[FloatArray], options: Newton
 ) -> list[tuple[ParameterEvaluation, FloatArray]]:
-    """Sort starts by the Newton correction that the Jacobian at the padded low-order solution `q` foretells from each.
+    """Sort starts by their Newton correction with the Jacobian at the padded low-order solution `q`.
 
-    The residual is no measure: a contact that has changed its state adds its stiffness times the motion to it, however near the
-    solution is. Where there is no correction, the residual decides after all.
+    The residual is a poor measure: a contact that has changed its state adds its stiffness times the motion, however near the solution
+    is. It decides only where the Jacobian is singular.
     """
     starts = [(balance.linearise(x, omega), x) for x in (q, *others)]
     jac = starts[0][0].jac
@@ -301,7 +306,7 @@ def _nearest_first(
 def _from_start(
     balance: Balance, omega: float, start: tuple[ParameterEvaluation, FloatArray], options: Newton
 ) -> Solution:
-    """Solve from a start that is evaluated already."""
+    """Solve from a start that has been evaluated."""
     first, begin = start
 
     def evaluate(x: FloatArray) -> ParameterEvaluation:
@@ -311,7 +316,7 @@ def _from_start(
 
 
 def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
-    """Return q + Δq in a list; empty if q is no solution, or the strategy knows no better start."""
+    """Return q + Δq in a list; empty if q is no solution, or the strategy predicts no start."""
     if not point.converged:
         return []
     if point.start.size:
@@ -406,7 +411,7 @@ def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Itera
 def _from_behind(
     problem: ForcedProblem, tried: Sequence[ForcedPoint], stored: Iterator[ForcedPoint]
 ) -> Iterator[ForcedPoint]:
-    """Look for frequencies that were not found once more, along the branch from the frequency after each, the last ones first."""
+    """Solve failed frequencies once more along the branch from the next frequency, the last ones first."""
     last = {p.index: p for p in tried}
     for index in reversed(range(len(last) - 1)):
         if last[index].converged or not last[index + 1].converged:
@@ -424,7 +429,7 @@ def _from_behind(
 def _solution(
     problem: ForcedProblem, balance: AnyBalance, tried: Sequence[ForcedPoint], omega: float, start: ComplexArray | None
 ) -> Solution:
-    """Solve from a given start or the solutions so far; then along the branch from there; then without a start."""
+    """Solve from a given start or previous solutions, then along the branch from these, then without a start."""
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
     near = _nearest(tried, balance.harmonics, omega)
     guesses = [] if start is None else [balance.unknowns(start)]
@@ -435,7 +440,7 @@ def _solution(
         return sum(s.iterations for s in spent)
 
     if guesses:
-        # the smallest residual decides: contact states may have changed since, or with the harmonics
+        # the start with the smallest residual: contact states may differ with the frequency or the harmonics
         sizes = [float(np.linalg.norm(balance.linearise(x, omega).residual)) for x in guesses]
         x = guesses[int(np.argmin(sizes))]
         spent.append(newton(lambda v: balance.linearise(v, omega), x, quick))
@@ -453,7 +458,7 @@ def _solution(
 
 
 def _nearest(tried: Sequence[ForcedPoint], harmonics: Harmonics, omega: float) -> list[ForcedPoint]:
-    """Return the last solutions with the same harmonics, at all, and at another frequency."""
+    """Return the last solution with the same harmonics, the last of all, and the last at another frequency."""
     found = [p for p in tried if p.converged]
     alike = [p for p in found if p.support == harmonics]
     elsewhere = [p for p in found if p.omega != omega]
@@ -463,10 +468,10 @@ def _nearest(tried: Sequence[ForcedPoint], harmonics: Harmonics, omega: float) -
 def _judged(
     problem: ForcedProblem, point: ForcedPoint, following: float, before: Step | None
 ) -> tuple[Step | None, Verdict]:
-    """Return the solution as given to the strategy, and the verdict of the strategy."""
+    """Return the strategy's input for a solution, and its verdict."""
     reference = problem.high.harmonics
     if not point.converged:
-        # one that is not found may be so because its harmonics are too few
+        # a failed point may have too few harmonics
         return None, Verdict(np.nan, reference, problem.sweep.low_harmonics)
     balance = problem.local(point.support, point.by_dof)
     x = balance.unknowns(point.coefficients)
@@ -477,7 +482,7 @@ def _judged(
 def _more(
     problem: ForcedProblem, had: Harmonics, by_dof: ByDof | None, verdict: Verdict
 ) -> tuple[Harmonics | None, ByDof | None]:
-    """Return the harmonics of a repeat, and those of each coordinate; None if it would have no more than there were: that ends every quarrel."""
+    """Return the harmonics of a repeat, for all coordinates and for each; None unless they include new ones, so that repeats end."""
     asked = verdict.again or ()
     if by_dof is None and verdict.again_by_dof is None:
         wanted = tuple(sorted({*had, *asked}))

@@ -1,4 +1,4 @@
-"""One forced response: the problem set up for both passages, and the points that it consists of."""
+"""Problem of a forced response, set up for all passages, and its points."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -27,11 +27,11 @@ from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
 
 Balance = HarmonicBalance | DynamicLagrangian
-FAINTEST = 1e-7  # excitation over static load: a thousand times the residual tolerance, which swallows the vibration
-ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
-SAMPLES_A_HARMONIC = 8  # at least, whatever the sweep says
+FAINTEST = 1e-7  # smallest excitation over static load: a thousand times the residual tolerance, below which the vibration is lost
+ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step by an iterative solver
+SAMPLES_A_HARMONIC = 8  # smallest number of samples, whatever the sweep has
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
-DETOUR = 30  # most points on the way from a neighbour
+DETOUR = 30  # largest number of points between a neighbour and a frequency
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,14 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        With ``high = "auto"`` the kinds of `stickslip.response.continuation.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
-        passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
-        repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
-        ``peak`` solved with more harmonics, to compare. ``in_time``: what was not found, from the motion in time. ``settled``: with more harmonics, where a prediction alone spoke for a point
-        or against it; of several at a frequency that with most counts. ``compared``: solved with more harmonics, to compare.
+        With ``high = "auto"``, the kinds of `stickslip.response.continuation.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``,
+        ``found``. In the published passages, ``low``: first passage; ``high``: repeat with more harmonics; ``branch``: on the branch with
+        more harmonics, where repeats failed. In all responses, ``peak``: added to resolve the peak; ``check``: a ``peak`` with more
+        harmonics, for comparison; ``in_time``: a failed frequency solved from time integration; ``settled``: with more harmonics, where
+        only a prediction judged the point before; ``compared``: with more harmonics, for comparison. Among several ``peak`` or
+        ``settled`` points at a frequency, the one with most harmonics counts.
     index
-        Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
+        Position in the stage. A ``high`` point has the index of the ``low`` point that it repeats, a ``branch`` point the index of the
         first repeat that it replaces.
     omega
         Frequency, rad/s.
@@ -60,23 +61,23 @@ class ForcedPoint:
     iterations
         Newton steps.
     predicted_error
-        Indicator of the strategy, for an alert the predicted error as a fraction; NaN where it was not computed.
+        Indicator of the strategy; for an alert, the predicted error as a fraction. NaN where it was not computed.
     seconds_contact, seconds_linear, seconds_total
-        Computing time of contact forces, of factorisations, and in total, s.
+        Computing time of contact forces, of factorisations, and total, s.
     rescue
         Method that found the solution.
     harmonics
-        Harmonics kept, growing from 0.
+        Harmonics kept, in ascending order from 0.
     asked
-        Harmonics with which the strategy requests another solution; empty: no request.
+        Harmonics of the solution that the strategy requests next; empty: no request.
     start
-        (H+1, n_retained) coefficients to start that solution from, m; empty: no start, or no request.
+        (H+1, n_retained) starting coefficients of that solution, m; empty: no start, or no request.
     kept
-        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, otherwise 0; empty: all coordinates keep all harmonics.
+        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, else 0; empty: all coordinates keep all harmonics.
     marched
         Results of time integration, in the order of `stickslip.response.forced.from_time.Marched`; empty without one.
     shot
-        What shooting knows of the motion, for a response by shooting; empty for one by balance.
+        Results of shooting; empty for a response by harmonic balance.
     """
 
     stage: Stage
@@ -102,7 +103,7 @@ class ForcedPoint:
 
     @property
     def unknowns(self) -> int:
-        """Real coefficients that were solved for; by shooting the states."""
+        """Number of real unknowns; for shooting, the states."""
         if self.shot:
             (one,) = self.shot
             return 2 * one.displacement.size + one.states.size
@@ -140,8 +141,8 @@ class ForcedProblem:
     low: Balance
     high: Balance
     others: dict[Harmonics, Balance] = field(default_factory=dict)  # made when first needed
-    ways: dict[AnyBalance, Following] = field(default_factory=dict, init=False)  # of each
-    own_errors: dict[ForcedPoint, float] = field(default_factory=dict, init=False)  # predicted of each
+    ways: dict[AnyBalance, Following] = field(default_factory=dict, init=False)  # continuation options
+    own_errors: dict[ForcedPoint, float] = field(default_factory=dict, init=False)  # predicted
 
     @cached_property
     def strategy(self) -> Strategy:
@@ -163,7 +164,7 @@ class ForcedProblem:
 
     @property
     def alert_solve(self) -> Solve:
-        """Linear solver of the alert's enlarged system: Newton's solver with a tolerance fine enough for an error of a thousandth."""
+        """Linear solver of the alert's enlarged system: Newton's solver with a tolerance for errors of 0.1 %."""
         return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
 
     def balance(self, harmonics: Harmonics) -> Balance:
@@ -178,7 +179,7 @@ class ForcedProblem:
         return self.others[harmonics]
 
     def local(self, harmonics: Harmonics, by_dof: ByDof | None) -> AnyBalance:
-        """Return the periodic problem with harmonics by retained coordinate; for None, with these `harmonics` in all coordinates."""
+        """Return the periodic problem with harmonics by retained coordinate; None: with `harmonics` in all coordinates."""
         whole = self.balance(harmonics)
         if by_dof is None or all(own == harmonics for own in by_dof):
             return whole
@@ -192,7 +193,7 @@ class ForcedProblem:
         next_omega: float | None = None,
         left: Events | None = None,
     ) -> Step:
-        """Return the input of a strategy for a scaled solution of `balance`, with the contact events `left` by its evaluation."""
+        """Return a strategy's input for a scaled solution of `balance`; `left`: the contact events of its evaluation, if known."""
         smallest = self.sweep.low_harmonics
         by_dof = None
         if isinstance(balance, LocalBalance):
@@ -243,7 +244,7 @@ class ForcedProblem:
         return always_kept(self.strategy) != "low"
 
     def asks_again(self, point: ForcedPoint) -> bool:
-        """Whether a point of the first passage is repeated: after an alert, or a failure that neighbours or more harmonics may resolve."""
+        """Whether to repeat a point of the first passage: after an alert, or a failure that neighbours or more harmonics may resolve."""
         anew = self.sweep.rescue == "all" or point.support != self.high.harmonics
         return (self.repeats and not point.converged and anew) or self.alerted(point)
 
@@ -255,18 +256,18 @@ class ForcedProblem:
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
-        """Return the largest relative error of a point against another at its frequency (eq. 29 where the measure is the published one), a fraction."""
+        """Return the largest relative error of a point against a reference at its frequency, a fraction (eq. 29 for the published measure)."""
         return self.difference(point.omega, point.coefficients, reference.coefficients)[0]
 
     def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> tuple[float, int]:
-        """Return the largest relative difference of two motions (H+1, n_retained), as a fraction of the first, and the position of that dof."""
+        """Return the largest difference of two motions (H+1, n_retained), relative to the first, and the position of its dof."""
         rows = self.measure.rows(len(one), len(other))
         linear = self._linear_of(rows - 1)
         motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
         return self.measure.change(motion, exact - motion)[:2]
 
     def _linear_of(self, order: int) -> DynamicStiffness:
-        """Return a linear side with matrices for harmonics up to `order`; of a wheel that of a balance that has them."""
+        """Return a linear side with matrices for harmonics up to `order`; for a wheel, from a balance that has them."""
         every = (self.low, self.high, *self.others.values())
         known = (b.linear for b in every if b.linear.most is None or b.linear.most >= order)
         return next(known, self.low.linear)
@@ -294,7 +295,7 @@ class ForcedProblem:
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
-    """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
+    """Set up the forced response of `system` under `load`; the cap of ``auto`` is lowered to the harmonics of a tuned wheel."""
     refuse_ill_posed(system)
     if sweep.auto and system.structure.harmonics:
         sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
@@ -308,7 +309,7 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             )
     linear = system.condensed(load, reference[-1])
     low = _periodic(system, linear, sweep)
-    # norms, as the tolerance bounds one: the share of a node says nothing of the whole force
+    # compare norms, as the residual tolerance is one
     dynamic = float(np.linalg.norm(list(load.harmonics.values())))
     if 0.0 < dynamic < FAINTEST * low.force_scale:
         raise input_error(
@@ -323,7 +324,7 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
 
 
 def with_stiffness(balance: AnyBalance) -> HarmonicBalance:
-    """Return a periodic problem whose contact forces are functions of the gaps, with all its harmonics at all coordinates.
+    """Return a periodic problem with contact forces as functions of the gaps, and with all harmonics at all coordinates.
 
     Raises
     ------
@@ -342,7 +343,7 @@ def with_stiffness(balance: AnyBalance) -> HarmonicBalance:
 
 
 def _periodic(system: System, linear: DynamicStiffness, sweep: Sweep) -> Balance:
-    """Return the periodic problem of the first passage; rigid contacts ask for all harmonics everywhere."""
+    """Return the periodic problem of the first passage; rigid contacts need all harmonics at all coordinates."""
     first, interface = sweep.first_harmonics, system.interface
     if not interface.rigid:
         return harmonic_balance(linear, interface, first, sweep.samples, sweep.evaluator)

@@ -1,4 +1,4 @@
-"""The resonance peak of a forced response, resolved by a few points, and audited."""
+"""Resonance peak of a forced response: resolved by a few added points, and audited."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -19,18 +19,18 @@ from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.newton_method import Solution, charged, first_converged, newton
 from stickslip.solve.status import Rung
 
-NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
-WALK = 6  # points beyond the bracket, each twice as far, until the peak lies within
-PEAK_CHANGE = 0.005  # relative change of a peak by more harmonics that ends its audit
+NEARBY = 0.002  # half-width of the initial bracket about a known peak, relative to its frequency
+WALK = 6  # most points beyond the bracket, each twice as far, until the peak is enclosed
+PEAK_CHANGE = 0.005  # relative change of a peak with more harmonics that ends its audit
 ALMOST = 0.95  # share of the peak above which points get its harmonics
-FREQUENCY_RTOL = 1e-5  # relative distance of frequencies at which another point would tell nothing
-PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
+FREQUENCY_RTOL = 1e-5  # smallest useful relative distance of frequencies
+PEAK_RESOLUTION = 5e-4  # width of a resolved peak's bracket, relative to its frequency
 
 
 def resolve_peak(
     problem: ForcedProblem, accepted: Sequence[ForcedPoint], done: Iterable[ForcedPoint] = ()
 ) -> Iterator[ForcedPoint]:
-    """Add points around the highest one until its bracket is narrow, each with the harmonics that it needs.
+    """Add points around the highest one until its bracket is narrow, each with the harmonics it needs.
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ def resolve_peak(
     Yields
     ------
     ForcedPoint
-        Points not in `done`: ``peak``, of which the one with most harmonics counts at each frequency, and ``check`` with more harmonics,
-        for comparison.
+        Points not in `done`: ``peak``, the one with most harmonics counts at each frequency; ``check`` with more harmonics, for
+        comparison.
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
-    search = _Search(problem, iter(done))  # an iterator is used as far as the peak needs it
+    search = _Search(problem, iter(done))  # an iterator is consumed as far as the peak needs it
     yield from _refined(problem, search, known, problem.sweep.peak_points)
     if not known or not problem.sweep.auto or not problem.sweep.peak_points:
         return
@@ -56,7 +56,7 @@ def resolve_peak(
     made = yield from search.settled(top, audit=True)
     if made is top:
         return
-    # what is nearly as high with fewer harmonics may only be so high because it has few
+    # points nearly as high may only be so because they have fewer harmonics
     height = ALMOST * problem.amplitude(made)
     for place, point in enumerate(known):
         if point is top:
@@ -67,7 +67,7 @@ def resolve_peak(
 
 
 def _refined(problem: ForcedProblem, search: "_Search", known: list[ForcedPoint], most: int) -> Iterator[ForcedPoint]:
-    """Add points around the highest of `known` until its bracket is narrow, at most so many."""
+    """Add at most `most` points around the highest of `known` until its bracket is narrow."""
     heights = [problem.amplitude(p) for p in known] if most else []
     for _ in range(most):
         if not known:
@@ -92,12 +92,12 @@ def _highest(problem: ForcedProblem, known: Sequence[ForcedPoint]) -> int:
 
 
 def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
-    """Return the peak of `problem` near a peak of a slightly different one; None if no solution is found there.
+    """Return the peak of `problem` near a peak of a slightly different problem; None without a solution there.
 
     Parameters
     ----------
     problem
-        The changed problem. The order of its first passage, or its high order, equals that of `point`.
+        The changed problem. Its low or its high order equals the order of `point`.
     point
         The known peak.
     """
@@ -130,19 +130,19 @@ Taken = Generator[ForcedPoint, None, ForcedPoint]
 
 @dataclass(slots=True, eq=False)
 class _Search:
-    """Solves points of a peak, or takes them from an interrupted run."""
+    """Search that solves points of a peak, or takes them from an interrupted run."""
 
     problem: ForcedProblem
     stored: Iterator[ForcedPoint]
     count: int = 0
 
     def point(self, sides: Sequence[ForcedPoint], omega: float) -> Taken:
-        """Solve at a frequency with the larger set of harmonics of its two neighbours, and with more where the strategy requests it."""
+        """Solve at a frequency with the larger set of its two neighbours' harmonics, and with more if the strategy requests it."""
         made = yield from self._take(lambda: self._between(sides, omega))
         return (yield from self.settled(made))
 
     def settled(self, made: ForcedPoint, *, audit: bool = False) -> Taken:
-        """Add harmonics until a point needs no more; `audit`: compare it with more harmonics in any case."""
+        """Add harmonics until a point needs no more; `audit`: always compare it with more harmonics."""
         auto = self.problem.sweep.auto
         while made.converged:
             curve = self._curve(made.support)
@@ -162,14 +162,14 @@ class _Search:
         return made
 
     def _enough(self, curve: ForcedCurve, made: ForcedPoint, more: ForcedPoint, *, audit: bool) -> bool:
-        """Whether more harmonics change a point by little; a peak by very little."""
+        """Whether more harmonics change a point little enough; the limit for a peak is tighter."""
         change = self.problem.amplitude(more) / self.problem.amplitude(made) - 1.0
         if audit and abs(change) > PEAK_CHANGE:
             return False
         return curve.agree(of_forced(curve, made), of_forced(curve, more))
 
     def raised(self, point: ForcedPoint, support: Harmonics) -> Taken:
-        """Solve a point with the harmonics of a support; return the point itself if that fails."""
+        """Solve a point with the harmonics of `support`; return the point itself if this fails."""
         curve = self._curve(support)
         now, level = of_forced(curve, point), curve.supports.index(support)
         more = yield from self._take(lambda: self._more(curve, now, level, "check"))
@@ -188,7 +188,7 @@ class _Search:
         return known
 
     def _curve(self, support: Harmonics) -> ForcedCurve:
-        """Return the levels of harmonics that a point may have."""
+        """Return the curve with the levels of harmonics that a point may have."""
         problem, strategy = self.problem, self.problem.strategy
         if problem.sweep.auto:
             return ForcedCurve(problem, problem.sweep.supports)
@@ -197,7 +197,7 @@ class _Search:
         return ForcedCurve(problem, supports, raises=few)
 
     def _between(self, sides: Sequence[ForcedPoint], omega: float) -> ForcedPoint:
-        """Solve along the branch from either side, then as without one."""
+        """Solve along the branch from either side, then without a branch."""
         most = max(sides, key=lambda p: p.harmonics.size).support
         curve = self._curve(most)
         level = curve.supports.index(most)
@@ -218,7 +218,7 @@ class _Search:
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
-        """Solve with more harmonics, from the prediction of the strategy and from the padded solution."""
+        """Solve with more harmonics, from the strategy's prediction and from the padded solution."""
         balance, options = curve.problem(level), self.problem.sweep.newton
         solution = first_converged(
             newton(lambda x: balance.linearise(x, now.p), start, options) for start in curve.starts(now, level)
@@ -240,13 +240,13 @@ class _Search:
 
 
 def _on_seam(known: Sequence[ForcedPoint], top: int) -> bool:
-    """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
+    """Whether the highest point has fewer harmonics than a neighbour: then it may be the highest for this reason."""
     few = known[top].harmonics.size if known else 0
     return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)
 
 
 def peak_vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
-    """Return the next frequency in the search for the peak; None when it is resolved, at the ends of the branch, or beside a fold."""
+    """Return the next frequency in the search for the peak; None if it is resolved, at an end of the branch, or beside a fold."""
     top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):
         return None
@@ -256,7 +256,7 @@ def peak_vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float
         return None
     below, above = (b - a) * (v - w), (b - c) * (v - u)
     wider = 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
-    # a kink holds the parabola on one side of the peak: halve the other side once it is three times as wide
+    # at a kink, parabolas stay on one side of the peak: halve the other side once it is three times as wide
     if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
         return wider
     vertex = float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))

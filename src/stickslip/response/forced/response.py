@@ -1,6 +1,6 @@
-"""The steady forced response over a range of frequencies: along the branch with as many harmonics as it needs, or as published.
+"""Steady forced response over a range of frequencies: along the branch with adaptive harmonics, or by the published passages.
 
-Last come a few points that resolve the resonance peak.
+A few points that resolve the resonance peak come last.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ def forced_response(
     Parameters
     ----------
     system
-        Structure, contacts and outputs; the first output decides where the peak is.
+        Structure, contacts and outputs; the first output defines the peak.
     load
         Static and harmonic forces on all dofs, N.
     sweep
@@ -89,6 +89,6 @@ def forced_response(
     for point in resolve_peak(problem, accepted_points(solved), left):
         peak.append(point)
         yield point
-    last = list(left)  # of an interrupted run, made after the peak was resolved
+    last = list(left)  # points of an interrupted run that followed the peak
     solved += [p for p in peak if not any(p is one for one in last)]
     yield from settle(problem, accepted_points(solved), solved, iter(last), of_peak=True)

@@ -1,6 +1,6 @@
-"""Doubtful points solved again with more harmonics until two levels agree.
+"""Doubtful points, solved again with more harmonics until two levels agree.
 
-What a prediction says of a point, and not how many others were asked for, decides whether it is solved again, and each point has its own budget.
+The point's own prediction decides whether it is solved again, not the number of requested points. Each point has its own budget.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -19,14 +19,14 @@ from stickslip.response.verification import own_error, with_waves
 from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
-SOLUTIONS = 10  # of a point at most
-# Newton steps of a small system that are spent in any case; beyond, as much as the branch itself has taken
+SOLUTIONS = 10  # largest number of solutions for a point
+# least budget, in Newton steps of a small system; otherwise the work of the branch
 WORK = 2000.0
-# share of the threshold above which a prediction that nothing has confirmed is not believed
+# share of the threshold above which an unconfirmed prediction is doubtful
 BELIEVED = 0.5
-CAP_SAFETY = SAFETY[1]  # on the change from fewer harmonics, where there are no more
-LOST = 2  # levels without a motion nearby after which a point is left as it is
-BESIDE = 2  # neighbours on either side from which a motion with more harmonics is looked for
+CAP_SAFETY = SAFETY[1]  # factor on the change from fewer harmonics, at the highest level
+LOST = 2  # failed levels after which a point is left unchanged
+BESIDE = 2  # neighbours on either side that serve as starts with more harmonics
 
 Taken = Generator[ForcedPoint, None, ForcedPoint]
 
@@ -39,7 +39,7 @@ def settle(
     *,
     of_peak: bool = False,
 ) -> Iterator[ForcedPoint]:
-    """Solve points whose verdict rests on a prediction with more harmonics, until two levels agree.
+    """Solve points again whose verdict is a mere prediction, with more harmonics until two levels agree.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def settle(
     Yields
     ------
     ForcedPoint
-        Points not in `stored`: ``settled`` (at a peak ``peak``), which replaces the point with fewer harmonics; ``compared`` (``check``),
-        for comparison.
+        Points not in `stored`: ``settled`` (``peak`` at a peak), which replaces the point with fewer harmonics; ``compared`` (``check``) for
+        comparison.
     """
     if not problem.strategy.verifies:
         return
@@ -71,15 +71,15 @@ def settle(
     audits = audits_by_frequency(solved)
     places = [i for i, p in enumerate(accepted) if p.converged and (p.stage == "peak") == of_peak and i not in done]
     open_ = (i for i in places if _open(problem, accepted[i], audits.get(accepted[i].omega, [])))
-    # where the work does not suffice for all, it goes to those that need little of it
+    # cheap points first, as the budget may not suffice for all
     for place in sorted(open_, key=lambda i: accepted[i].harmonics.size):
         yield from settling.settle(place)
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
-    """Whether a prediction speaks against a point and no solution with more harmonics for it, or stands near the threshold alone."""
+    """Whether a point is doubtful: its predicted error is large, or near the threshold, and no solution with more harmonics confirms it."""
     limit, bound = problem.strategy.threshold, point.predicted_error
-    if not problem.sweep.auto:  # what a study fixes stands; a doubt about it is compared with more
+    if not problem.sweep.auto:  # fixed harmonics are kept; doubtful points are only compared with more
         if point.support != problem.sweep.high_harmonics:
             return False
         bound = own_error(problem, point)
@@ -94,24 +94,24 @@ def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoi
 
 
 def _settles(problem: ForcedProblem, change: float, audit: ForcedPoint) -> bool:
-    """Whether a solution with more harmonics confirms a point that a prediction doubts.
+    """Whether a solution with more harmonics confirms a doubtful point.
 
-    The change to it and its own predicted error have to stay below the threshold together. A harmonic beyond both may excite a mode: one of damping
-    ratio 0.001 at the 13th moved the first by 6.7 %; the change from five to nine harmonics was 2.3 %, and 4.6 % were predicted of nine.
+    The change to this solution plus its own predicted error has to stay below the threshold, since an even higher harmonic may excite a mode. A mode of
+    damping ratio 0.001 at the 13th harmonic changed the first by 6.7 %; the change from five to nine harmonics was 2.3 %, the prediction of nine 4.6 %.
     """
     return change + own_error(problem, audit) <= problem.strategy.threshold
 
 
 @dataclass(frozen=True)
 class _Levels:
-    """Harmonics that a point may have, the fewest first, and more to compare with alone."""
+    """Sets of harmonics that a point may have, the fewest first, and larger sets for comparison only."""
 
     standing: tuple[Harmonics, ...]
     beyond: tuple[Harmonics, ...] = ()
 
 
 def _levels(problem: ForcedProblem) -> _Levels:
-    """Return the levels of a sweep. Where a study fixes its harmonics, no point keeps more; higher levels serve to compare."""
+    """Return the levels of a sweep; with fixed harmonics, higher levels serve for comparison only."""
     sweep = problem.sweep
     if sweep.auto:
         return _Levels(sweep.supports)
@@ -149,10 +149,10 @@ class _Settling:
     stored: Iterator[ForcedPoint]
     stages: tuple[Stage, Stage]
     left: float  # work
-    spent: int = 0  # solutions of the point that is being settled
+    spent: int = 0  # solutions for the current point
 
     def settle_highest(self) -> Generator[ForcedPoint, None, set[int]]:
-        """Compare the highest point with more harmonics, until the highest point has been compared; return the positions of all of them."""
+        """Compare the highest point with more harmonics until the then highest one has been compared; return their positions."""
         seen: set[int] = set()
         for _ in range(SOLUTIONS):
             heights = [self.problem.amplitude(p) if p.converged else -np.inf for p in self.known]
@@ -164,7 +164,7 @@ class _Settling:
         return seen
 
     def settle(self, place: int) -> Iterator[ForcedPoint]:
-        """Yield solutions of a point with more and more harmonics until the motion no longer changes."""
+        """Yield solutions of a point with increasing harmonics until the motion no longer changes."""
         lost, levels = 0, _levels(self.problem)
         limit, self.spent = AGREE * self.problem.strategy.threshold, 0
         for support in (*levels.standing, *levels.beyond):
@@ -175,7 +175,7 @@ class _Settling:
             if self._exhausted and more is None:
                 return
             if more is None:
-                lost += 1  # what one level does not find the next may
+                lost += 1  # the next level may still succeed
                 if lost == LOST:
                     return
                 continue
@@ -198,7 +198,7 @@ class _Settling:
     def _nearest(
         self, place: int, support: Harmonics
     ) -> Generator[ForcedPoint, None, tuple[ForcedPoint | None, float]]:
-        """Solve a point with the harmonics of a level, and return the nearest solution with its change; None without a solution."""
+        """Solve a point with more harmonics; return the nearest solution, None without one, and its relative change."""
         here, balance = self.known[place], _balance(self.problem, support)
         more: ForcedPoint | None = None
         change = np.inf
@@ -215,7 +215,7 @@ class _Settling:
         return more, change
 
     def _ways(self, place: int, balance: Balance) -> Iterator[Callable[[], ForcedPoint]]:
-        """Yield ways to the motion with more harmonics: from that with fewer, then from neighbours that have as many."""
+        """Yield attempts with more harmonics: from the point's own motion, then from neighbours with as many harmonics."""
         here = self.known[place]
         yield lambda: self._solved(balance, here, here)
         near = [place + side * d for d in range(1, BESIDE + 1) for side in (-1, 1)]
@@ -230,7 +230,7 @@ class _Settling:
         return forced_point(balance, found, self.stages[1], here.index, here.omega, 0.0)
 
     def _raised(self, more: ForcedPoint, bound: float) -> ForcedPoint:
-        """Return an audit solution as the accepted one of its frequency; with the most harmonics the change from fewer bounds its error."""
+        """Return an audit solution as the accepted one at its frequency; `bound` is its error at the highest level."""
         return replace(
             more, stage=self.stages[0], predicted_error=bound, iterations=0, seconds_contact=0.0, seconds_linear=0.0
         )

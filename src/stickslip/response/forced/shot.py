@@ -1,4 +1,4 @@
-"""What shooting knows of one point of a forced response, beside its harmonics."""
+"""Results of shooting for one point of a forced response, besides its harmonics."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from stickslip.arrays import ComplexArray, FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A periodic motion found by shooting; see `stickslip.response.ShootingResult`.
+    """Periodic motion found by shooting; see `stickslip.response.ShootingResult`.
 
     Attributes
     ----------
     residual
-        Distance of the state after a period from that before, relative to the vibration.
+        Change of the state over a period, relative to the vibration.
     step_error
         Estimated error of the harmonics by the time step, relative to the largest.
     growth_error
@@ -43,5 +43,5 @@ class Shot:
 
     @property
     def error(self) -> float:
-        """Error that counts for the verdict on the motion, a fraction; infinite where none is known."""
+        """Error for the verdict on the motion, a fraction; infinite if unknown."""
         return self.step_error if np.isfinite(self.step_error) else float("inf")

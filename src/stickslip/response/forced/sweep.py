@@ -28,49 +28,49 @@ class Sweep:
     Parameters
     ----------
     omega_range
-        First and last excitation frequency, rad/s, in growing order.
+        Smallest and largest excitation frequency, rad/s.
     low
-        Harmonics with which a response begins: the highest of all, or a list such as (1, 3, 5). The static term is always kept.
+        Initial harmonics: the highest one, or a list such as (1, 3, 5). The static term is always kept.
     high
-        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41; of a load in harmonic 2 alone their doubles) until the judgement is quiet, and audited. A number or a list:
-        those of the repeats, which are the reference of the Jacobian Alert as published; nothing goes beyond. Strategies that do not
-        verify take 5 for ``auto``.
+        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41; twice these for a load in harmonic 2 alone) until the estimated
+        error is below the threshold, and audited. A number or a list: harmonics of the repeats, which are the reference of the published
+        Jacobian Alert; no point has more. Strategies that do not verify take 5 for ``auto``.
     cap
-        Harmonic beyond which ``auto`` does not go; what is not quiet there is doubtful.
+        Highest harmonic of ``auto``; points that need more are doubtful.
     samples
         Samples per period of the contact forces.
     evaluator
-        How piecewise-linear laws are evaluated; ``events`` has no sampling error, which would put small corners and folds into branches.
+        Evaluation of piecewise-linear laws. ``events`` has no sampling error, which would add small corners and folds to branches.
     threshold
         Predicted error (fraction) above which a frequency is repeated.
     selection
-        Name of a strategy of `stickslip.harmonic.selection` (``guarded_alert``, the published ``jacobian_alert``, ...), one with parameters of your own, or the
+        Name of a strategy of `stickslip.harmonic.selection` (``guarded_alert``, the published ``jacobian_alert``, ...), a strategy object, or the
         same harmonics at every frequency (``always_low``, ``always_high``).
     passages
-        ``double``: finish the response with few harmonics first, then repeat what needs more; ``single``: settle each of
-        the equally spaced frequencies before the next one. Strategies that foretell the harmonics of the next frequency always
-        take the single one. Not used with ``high = "auto"``.
+        ``double``: complete the response with few harmonics, then repeat the points that need more; ``single``: settle each of the
+        equally spaced frequencies before the next. Strategies that predict the harmonics of the next frequency always use ``single``. Not
+        used with ``high = "auto"``.
     error_harmonics
-        Harmonics over which the predicted error is taken; None: those that the load drives.
+        Harmonics of the predicted error; None: the driven ones.
     relative_to
-        What a predicted error is relative to. ``answer``: of each output the vector of its complex amplitudes, or 1 % of the largest output of its unit if
-        that is more. ``each``: each harmonic of each dof by itself, those that hardly move left out, as published.
+        Reference of the predicted error. ``answer``: the vector of an output's complex amplitudes, or 1 % of the largest output of its unit
+        if that is more. ``each``: each harmonic of each dof separately, without those that hardly move, as published.
     amplitude_of
-        What the amplitude of an output is: ``first``, of the harmonics that the load drives; ``half_peak_to_peak``; ``rms``, over a period about the mean.
+        Definition of an output's amplitude: ``first``, of the driven harmonics; ``half_peak_to_peak``; ``rms``, over a period about the mean.
     points
-        Smallest number of points of the first passage; more are taken where the response turns.
+        Smallest number of points of the first passage; curved parts of the branch get more.
     frequencies
         Number of equally spaced frequencies to step through instead of following the branch by arc length; 0: arc length.
     at
-        Frequencies of your own to step through instead, rad/s, growing (falling too if the direction is ``down``), all in the range.
+        Listed frequencies to step through instead, rad/s, ascending (or descending if the direction is ``down``), all within the range.
     direction
-        ``up``: from the first frequency to the last; ``down``: from the last to the first, which finds other motions beside folds.
+        ``up``: from the smallest frequency to the largest; ``down``: the reverse, which finds other motions near folds.
     peak_points
         Largest number of points added to resolve the peak.
     rescue
-        ``off``: a frequency is looked for by the corrector alone, from its neighbours, the bonded vibration and few harmonics; listed
-        frequencies by no branch in between either. ``in_time``: then from the motion in time, if that repeats itself; if it does not, the
-        point says so. ``all``: by homotopies and other globalisations before that, 300 Newton steps at a point of 60 unknowns.
+        Attempts at a failed frequency. ``off``: the corrector from neighbours, from the bonded vibration and from few harmonics, without
+        a branch between listed frequencies. ``in_time``: then from time integration, if the motion repeats; if not, the point records
+        this. ``all``: homotopies and other globalisations before time integration, 300 Newton steps at a point of 60 unknowns.
     newton
         Corrector options.
     """
@@ -158,12 +158,12 @@ class Sweep:
 
     @property
     def auto(self) -> bool:
-        """Whether harmonics are raised along the branch until the judgement is quiet."""
+        """Whether harmonics are raised along the branch until the estimated error is small."""
         return self.high == "auto" and self.strategy.verifies
 
     @property
     def supports(self) -> tuple[Harmonics, ...]:
-        """Harmonics that ``auto`` goes through, the fewest first: multiples of what divides those of the first passage, which a load in harmonic 2 alone feeds."""
+        """Harmonics of each level of ``auto``, the fewest first: multiples of the common divisor of the initial harmonics."""
         low = self.low_harmonics
         step = multiples(low, low[-1])[1]
         rungs = sorted({*(step * rung for rung in RUNGS if step * rung < self.cap), self.cap})
@@ -176,7 +176,7 @@ class Sweep:
         if not isinstance(self.selection, str):
             return self.selection
         strategy = strategy_named(self.selection)
-        # the indicators of the others are no errors
+        # the indicators of other strategies are no errors
         return strategy_named(self.selection, self.threshold) if strategy.verifies else strategy
 
     @property
@@ -194,7 +194,7 @@ class Sweep:
 
     @property
     def forward(self) -> float:
-        """1 where frequencies grow on the way, -1 where they fall."""
+        """1 for growing frequencies, -1 for falling ones."""
         return 1.0 if self.direction == "up" else -1.0
 
     @property
@@ -203,12 +203,12 @@ class Sweep:
         return np.sort(self.at)[:: int(self.forward)] if self.at else self.spaced(self.frequencies)
 
     def spaced(self, count: int) -> FloatArray:
-        """Return `count` equally spaced frequencies in the order of the way, rad/s."""
+        """Return `count` equally spaced frequencies in the direction of the sweep, rad/s."""
         return np.linspace(*self.omega_range, count)[:: int(self.forward)]
 
     @property
     def control(self) -> StepControl:
-        """Step control of the branch: a step is at most a `points`-th of the range."""
+        """Step control of the branch: a step is at most the range over `points`."""
         first, last = self.omega_range
         control = steps_through(last - first, self.points)
         listed = self.rescue != "all" and self.grid.size > 0
@@ -216,13 +216,13 @@ class Sweep:
 
     @property
     def first_harmonics(self) -> Harmonics:
-        """Harmonics with which the first passage is made."""
+        """Harmonics of the first passage: the reference's for ``always_high``, otherwise the low ones."""
         high = always_kept(self.strategy) == "high"
         return self.high_harmonics if high else self.low_harmonics
 
 
 def _check_steps(sweep: Sweep) -> None:
-    """Refuse frequencies that are no list to step through, and a direction that is none."""
+    """Refuse invalid frequency lists and directions."""
     hint = "'up' goes from the first frequency to the last."
     check_choice("Sweep.direction", sweep.direction, get_args(Direction), hint)
     if not sweep.at:
