@@ -1,7 +1,8 @@
 """Number of OpenBLAS threads: one for small matrices, all for a large factorisation.
 
-The matrices of a response have a few hundred rows. More threads wait for each other there: with two, a point of 9 ms of work
-takes 220 ms of the processor. Sums then have the order, and so the bits, of a run of the command.
+The matrices of a response have a few hundred rows. Several threads wait for each other there: with two, a response point
+that needs 9 ms of work takes 220 ms of processor time. With one thread, sums have the same order in every run, so results
+in Python equal those of the command line bit by bit.
 """
 
 import ctypes
@@ -16,11 +17,11 @@ from threading import Lock
 from typing import Any, TypeVar, cast
 
 BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-SAID = any(name in os.environ for name in BLAS_THREADS)  # by the user: what comes later is ours
-# where the wheels of NumPy and SciPy keep OpenBLAS, and what they call its functions
+SAID = any(name in os.environ for name in BLAS_THREADS)  # by the user: later values are set by this package
+# folders of OpenBLAS in the wheels of NumPy and SciPy, and the names of its functions there
 FOLDERS = ("{0}.libs", "{0}/.dylibs")
 NAMES = ("scipy_openblas_{0}_num_threads64_", "scipy_openblas_{0}_num_threads")
-MIN_THREADED_ROWS = 1500  # rows of a dense matrix whose factors pay for the threads
+MIN_THREADED_ROWS = 1500  # rows of a dense matrix above which several threads factorise it faster
 
 Counts = list[tuple[Callable[[], int], Callable[[int], Any]]]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -28,7 +29,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @cache
 def loaded() -> Counts:
-    """Return the functions that get and set the number of threads of each OpenBLAS that NumPy or SciPy brought along."""
+    """Return the functions that get and set the number of threads, for each OpenBLAS bundled with NumPy or SciPy."""
     found: Counts = []
     for package in ("numpy", "scipy"):
         spec = find_spec(package)
@@ -45,7 +46,7 @@ def loaded() -> Counts:
 
 
 class _Blocks:
-    """The blocks at work that hold BLAS to one thread, of all threads of the program: its number is one for all."""
+    """Active blocks that limit BLAS to one thread, counted over all Python threads, which share this limit."""
 
     def __init__(self) -> None:
         self.lock, self.count, self.strict = Lock(), 0, 0
@@ -97,7 +98,7 @@ def one_loaded_blas_thread(*, strict: bool = True) -> Iterator[None]:
 
 @contextmanager
 def threads_for(rows: int) -> Iterator[None]:
-    """Give BLAS all threads again, despite `by_one_thread`, while a large dense matrix with `rows` rows is factorised."""
+    """Give BLAS all threads within the block if a dense matrix of `rows` rows is large, even inside `by_one_thread`."""
     if rows < MIN_THREADED_ROWS or not _BLOCKS.count or _BLOCKS.strict:
         yield
         return
@@ -109,7 +110,7 @@ def threads_for(rows: int) -> Iterator[None]:
 
 
 def by_one_thread(function: F) -> F:
-    """Return the function, or generator, with BLAS limited to one thread; code between the steps of a generator is not limited."""
+    """Decorate a function or generator: BLAS has one thread while it runs, but not between the steps of a generator."""
     if isgeneratorfunction(function):
 
         @wraps(function)

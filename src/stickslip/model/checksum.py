@@ -1,4 +1,4 @@
-"""Checksums behind the content of files and records."""
+"""Checksums at the end of files and records."""
 
 from hashlib import file_digest, sha256
 from io import BytesIO
@@ -7,11 +7,11 @@ from typing import IO
 
 MARK = b"\nstickslip: sha256 of all before: "
 LENGTH = len(MARK) + 2 * sha256().digest_size  # bytes of mark and sum
-MIN_MARK_BYTES = 8  # bytes of a mark that was cut off by which it is known; shorter ends may be the content's own
+MIN_MARK_BYTES = 8  # bytes by which a truncated mark is recognised; fewer may belong to the content
 
 
 class Cut(ValueError):  # noqa: N818  it tells what has happened
-    """The content was cut off within its checksum."""
+    """Error: the content ends within its checksum."""
 
 
 def with_checksum(content: bytes) -> bytes:
@@ -59,7 +59,7 @@ def check_file(path: Path) -> None:
 
 
 def _checked(stream: IO[bytes], size: int, *, required: bool) -> int:
-    """Return the number of bytes before the checksum after a comparison with it."""
+    """Compare the content with its checksum; return the number of bytes before the checksum."""
     stream.seek(max(size - LENGTH, 0))
     end = stream.read(LENGTH)
     at = end.rfind(MARK)

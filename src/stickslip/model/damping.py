@@ -75,7 +75,7 @@ class Damping:
         return self.modal is not None and self.modal != 0.0
 
     def of_matrices(self, structure: Structure, elastic: Matrix | None = None) -> Structure:
-        """Return a structure with proportional and structural damping, which follow from its matrices; `elastic` as in `structural_damping`."""
+        """Return the structure with proportional and structural damping; `elastic` as in `structural_damping`."""
         if self.ratio is not None and self.between_hz is not None:
             structure = rayleigh_damping(structure, self.ratio, self.between_hz)
         elif self.alpha or self.beta:
@@ -129,10 +129,10 @@ def modal_damping(structure: Structure, ratios: float | Sequence[float] | FloatA
     Parameters
     ----------
     structure
-        Structure whose damping matrix is replaced; Coriolis terms (the skew part) stay. Modes are those of its present mass and stiffness:
-        for ratios of an assembly, join parts or tie contacts first.
+        Structure whose damping matrix is replaced; Coriolis terms (the skew part) stay. The modes follow from its present mass
+        and stiffness: for ratios of an assembly, join parts or tie contacts first.
     ratios
-        Fraction of critical of each mode, lowest first; further modes and rigid ones are undamped. One number holds for all modes.
+        Damping ratio of each mode, lowest first; further modes and rigid ones are undamped. One number applies to all modes.
 
     Returns
     -------
@@ -177,10 +177,10 @@ def structural_damping(structure: Structure, loss_factor: float, *, elastic: Mat
     structure
         Structure whose loss matrix is replaced; viscous damping stays.
     loss_factor
-        η, twice the damping ratio of a resonance. Parts of different material: one call each, then `join`.
+        η, twice the damping ratio at resonance. For parts of different materials call the function once for each, then `join`.
     elastic
-        (n, n) stiffness that dissipates, N/m; that of the structure if not given. For a rotating structure give the stiffness at rest: neither centrifugal tension nor spin
-        softening dissipates.
+        (n, n) stiffness that dissipates, N/m; by default the structure's stiffness. For a rotating structure give the
+        stiffness at rest: neither centrifugal tension nor spin softening dissipates.
 
     Raises
     ------
@@ -209,7 +209,7 @@ def dissipates(structure: Structure) -> bool:
 
 
 def _with_dissipation(structure: Structure, damping: Matrix) -> Structure:
-    """Return the structure with another dissipation, its Coriolis terms kept."""
+    """Return the structure with `damping` in place of its dissipation; Coriolis terms stay."""
     own = structure.damping
     skew = (own - own.conj().T) / 2
     if structure.n and abs(skew).max() > ROUNDING * abs(own).max():

@@ -16,7 +16,7 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
 ELEMENT_TYPES = {4: "C3D4", 8: "C3D8", 10: "C3D10", 20: "C3D20"}
-ON_A_LINE = 10  # numbers; CalculiX takes 16 at most
+ON_A_LINE = 10  # numbers on a line; CalculiX accepts at most 16
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,12 +106,12 @@ def write_deck(
 
 
 def _numbers(mesh: SolidMesh) -> IntArray:
-    """Return the mesh's node numbers, raised where CalculiX, which counts from 1, has none."""
+    """Return the mesh's node numbers, shifted to start at 1 if some are smaller, which CalculiX refuses."""
     return np.asarray(mesh.numbers + max(0, 1 - int(mesh.numbers.min())))
 
 
 def _rows(numbers: IntArray) -> Iterator[str]:
-    """Lay numbers out, a few a line; all lines but the last end in a comma."""
+    """Yield lines of a few numbers each; all lines but the last end in a comma."""
     for start in range(0, len(numbers), ON_A_LINE):
         end = "," if start + ON_A_LINE < len(numbers) else ""
         yield ", ".join(str(n) for n in numbers[start : start + ON_A_LINE]) + end
@@ -121,7 +121,7 @@ def _mesh_cards(mesh: SolidMesh) -> Iterator[str]:
     numbers = _numbers(mesh)
     yield "** written by stickslip; SI units: m, kg, s, N, Pa"
     yield "*NODE, NSET=NALL"
-    # CalculiX reads 20 characters of a number: thirteen decimals are the most that fit
+    # CalculiX reads 20 characters of a number, which leaves room for at most thirteen decimals
     for number, (x, y, z) in zip(numbers, mesh.points, strict=True):
         yield f"{number}, {x:.13e}, {y:.13e}, {z:.13e}"
     yield f"*ELEMENT, TYPE={ELEMENT_TYPES[mesh.cells.shape[1]]}, ELSET=EALL"

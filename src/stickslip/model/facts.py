@@ -13,8 +13,8 @@ from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.units import RPM
 
-UNLIKE = 300.0  # times as large: millimetres and metres are 1000 apart
-SAME_SPEED = 1e-4  # relative: speeds are written with few digits
+UNLIKE = 300.0  # ratio of two sizes that suggests wrong units: millimetres and metres differ by 1000
+SAME_SPEED = 1e-4  # relative difference of equal speeds, which files write with few digits
 DEGREE = 4  # integrates volume and first moment of straight-edged cells of second order exactly
 
 
@@ -82,7 +82,7 @@ def facts_of_parts(parts: Iterable[Part]) -> Facts:
 
 
 def unlike_units(parts: Mapping[str, Part]) -> list[str]:
-    """Return a sentence for each pair of parts whose sizes or materials differ so much that the units of one are probably wrong."""
+    """Return a sentence for each pair of parts whose sizes or materials differ so much that units are probably wrong."""
     names = list(parts)
     found = []
     for i, one in enumerate(names):
@@ -97,7 +97,7 @@ def unlike_units(parts: Mapping[str, Part]) -> list[str]:
 
 
 def other_speeds(parts: Mapping[str, Part], speed: float) -> list[str]:
-    """Return a sentence for each part whose file has another speed than the model, rad/s."""
+    """Return a sentence for each part whose file has another speed than the model's `speed` in rad/s."""
     return [
         f"part.{name}: its file turns at {part.own_speed / RPM:.6g} rpm, the model at {speed / RPM:.6g} rpm."
         for name, part in parts.items()
@@ -106,14 +106,14 @@ def other_speeds(parts: Mapping[str, Part], speed: float) -> list[str]:
 
 
 def _size(part: Part) -> float:
-    """Return the diagonal of the box around a part's nodes, m; 0 where it is not known."""
+    """Return the diagonal of the box around a part's nodes, m; 0 if unknown."""
     facts = facts_of_part(part)
     box = np.array(facts.high) - np.array(facts.low)
     return float(np.linalg.norm(box)) if np.all(np.isfinite(box)) else 0.0
 
 
 def _of_material(name: str) -> Callable[[Part], float]:
-    """Return the function that reads a number of the first material of a part; 0 without a material."""
+    """Return a function that reads the property `name` of a part's first material; 0 without a material."""
 
     def number(part: Part) -> float:
         if part.solid is None:

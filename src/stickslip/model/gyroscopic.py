@@ -16,9 +16,9 @@ from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
 SPARE_MODES = 10  # modes beyond twice as many as are asked for
-RIGID_SQUARE = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
-STILL = 1e-9  # of the fastest rate: a smaller frequency is that of a motion that creeps, whatever its rounding
-KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
+RIGID_SQUARE = 1e-12  # fraction of the largest square: a negative square nearer to zero belongs to a rigid motion
+STILL = 1e-9  # fraction of the largest rate: a smaller frequency is rounding, and the motion grows or decays without oscillation
+KNOWN = 1e-8  # fraction of a static response outside the span of the modes; less is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +28,8 @@ class GyroscopicModes:
     Parameters
     ----------
     frequencies_hz
-        (n,) natural frequencies. Negative only for waves that rotation has overtaken: their frequency passes through zero to that of the same
-        wave in the other direction.
+        (n,) natural frequencies. Negative only for waves that rotation has overtaken: the frequency passes through zero, and
+        the wave then travels in the other direction.
     shapes
         (N, n) complex mode shapes of unit mass: ``φᴴ M φ = 1``.
     growth
@@ -92,7 +92,7 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
     """Return rates λ with ``Im λ ≥ 0`` and vectors of unit length of ``λ² + λ G + diag(squares)``."""
     n = squares.size
     if squares[0] >= 0.0:
-        # with √K q beside q̇ the state matrix is skew: i times it is Hermitian, frequencies come out real
+        # the state (√K q, q̇) has a skew matrix; i times it is Hermitian, so the frequencies are exactly real
         root = np.diag(np.sqrt(squares))
         state = np.block([[np.zeros((n, n)), 1j * root], [-1j * root, -1j * coriolis]])
         omega, states = scipy.linalg.eigh(state)
@@ -100,9 +100,9 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
     else:
         state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(squares), -coriolis]])
         rates, states = scipy.linalg.eig(state)
-    # of a motion that creeps both rates have the frequency zero: what grows counts
+    # both rates of a motion without oscillation have the frequency zero: the growing one comes first
     kept = np.lexsort((-rates.real, -_without_rounding(rates)))[:n]
-    # velocities are λ times displacements, and never vanish where λ does not
+    # shapes from velocities, λ times the displacements: they vanish only where λ does
     shapes = states[n:, kept]
     still = np.linalg.norm(shapes, axis=0) == 0.0
     shapes[:, still] = states[:n, kept][:, still]
@@ -110,7 +110,7 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
 
 
 def _without_rounding(rates: ComplexArray) -> FloatArray:
-    """Return the circular frequencies of rates, zero where only rounding keeps them from it."""
+    """Return the circular frequencies of rates, with rounding set to zero."""
     omega = rates.imag
     return np.where(np.abs(omega) <= STILL * np.max(np.abs(rates), initial=0.0), 0.0, omega)
 
@@ -118,7 +118,7 @@ def _without_rounding(rates: ComplexArray) -> FloatArray:
 def _enriched(
     structure: Structure, coriolis: Matrix, n_basis: int, shift: float | None, factors: Factors | None
 ) -> tuple[FloatArray, Matrix]:
-    """Return squares and shapes of the structure on its lowest modes and the static answers to their Coriolis forces."""
+    """Return squares and shapes in the span of the lowest modes and the static responses to their Coriolis forces."""
     K, M = structure.stiffness, structure.mass
     start = usual_shift(structure) if shift is None else shift
     solve = (factors or factorise)(K - start * M)
@@ -129,10 +129,10 @@ def _enriched(
     answers = solve(np.asarray(coriolis @ modes))
     size = np.linalg.norm(answers, axis=0)
     answers = answers - modes @ (modes.conj().T @ (M @ answers))
-    # nothing is left of an answer where Coriolis forces vanish or the modes know it already
+    # without Coriolis forces, or within the span of the modes, nothing is left of a response
     left = np.linalg.norm(answers, axis=0) > KNOWN * size
     columns = [each / np.linalg.norm(each, axis=0) for each in (modes, answers[:, left])]
     basis = np.linalg.qr(np.hstack(columns))[0]
     squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
-    # a rigid motion has no strain, but for rounding
+    # the squares of rigid motions are zero: negative ones are rounding
     return np.where(squares < -RIGID_SQUARE * squares[-1], squares, np.maximum(squares, 0.0)), basis @ vectors

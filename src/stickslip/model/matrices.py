@@ -57,7 +57,7 @@ def lumped(
 def lumped_sector(
     mass: Sequence[float], stiffness: FloatArray, damping: FloatArray, names: Sequence[str], behind: Sequence[str]
 ) -> Structure:
-    """Return one sector of a wheel of masses, with massless copies of masses of the next sector after its own masses.
+    """Return one sector of a wheel of masses; after its own masses come massless copies of masses of the next sector.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def lumped_sector(
     names
         Names of the n masses; each becomes a set.
     behind
-        The m masses with a copy: the set ``cyclic_low`` contains them, ``cyclic_high`` the copies.
+        Names of the m masses with a copy: the set ``cyclic_low`` contains these masses, ``cyclic_high`` their copies.
     """
     own = lumped(np.array(mass), np.zeros((len(mass), len(mass))), names=names)
     n, copies = own.n, len(behind)

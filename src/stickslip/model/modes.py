@@ -1,4 +1,7 @@
-"""Natural frequencies and modes of dense and sparse structures, real or at a wave number; the mass of small models may be singular."""
+"""Natural frequencies and modes of dense and sparse structures, real or at a wave number.
+
+The mass matrix of small models may be singular.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,12 +18,12 @@ from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Dofs, Structure
 from stickslip.units import HZ
 
-RIGID_STRAIN = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
-FAR = 1e4  # so many times the mean K_ii / M_ii below zero there are no squares
-LARGEST_ENTRY = 1e100  # entries of matrices above, or below its inverse, are no numbers of a model
-INDEFINITE = 1e-9  # of the largest eigenvalue of a mass matrix: negative ones beyond are no rounding
-ROUNDED = 1e-12  # of the terms that an eigenvalue is the sum of: below, it is rounding
-SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
+RIGID_STRAIN = 1e-14  # strain energy of a mode over the sum of its terms' magnitudes: less is rounding
+FAR = 1e4  # multiple of the mean K_ii / M_ii; no square is below minus this value
+LARGEST_ENTRY = 1e100  # entries of matrices above it, or below its inverse, are implausible
+INDEFINITE = 1e-9  # fraction of the largest eigenvalue of a mass matrix: a more negative eigenvalue is not rounding
+ROUNDED = 1e-12  # eigenvalue over the terms that it is the sum of: less is rounding
+SHIFT = 1e-8  # default shift below zero over the mean K_ii / M_ii: K − shift M is then regular for a free body
 
 Factors = Callable[[Matrix], Factorisation]
 
@@ -34,7 +37,7 @@ class Modes:
     squares
         (n,) squares of the circular frequencies in rad²/s²; rigid motions have exactly zero.
     shapes
-        (N, n) mass-normalised, complex for a complex Hermitian structure.
+        (N, n) mass-normalised shapes, complex for a complex Hermitian structure.
     """
 
     squares: FloatArray
@@ -70,7 +73,7 @@ def normal_modes(
     say
         Called with a sentence before each long step.
     factors
-        Function that factorises ``K − shift M`` of the whole structure, such as that of `WaveFamily`; None: `factorise`.
+        Function that factorises ``K − shift M`` of the whole structure, such as the one of `WaveFamily`; None: `factorise`.
 
     Raises
     ------
@@ -83,8 +86,8 @@ def normal_modes(
     Notes
     -----
     The signs of the pivots of ``K − shift M`` count the squares below the shift, so that none is missed. SuperLU's factors
-    with more than `MAX_COUNTED_ENTRIES` entries are not examined: then modes with negative squares are found only if they are
-    nearer to the shift than the n-th mode; give a shift below them.
+    with more than `MAX_COUNTED_ENTRIES` entries are not examined. A mode with a negative square is then found only if it is
+    nearer to the shift than the n-th mode; give a shift below all squares.
     """
     _check_count("normal_modes", structure, n)
     refuse_bad_mass(structure, "normal_modes")
@@ -123,14 +126,14 @@ def _with_missed(
     mean: float,
     factorised: Callable[[Matrix], Factorisation],
 ) -> tuple[FloatArray, Matrix]:
-    """Return the modes `found` nearest to a shift, and those far below it in place of the highest ones."""
+    """Return the modes `found` nearest to a shift, with missed modes far below the shift in place of the highest ones."""
     (values, shapes), (shift, solve) = found, shifted
     far = solve.negative
     if not far or far == np.count_nonzero(values < shift):
         return found
-    if solve.backend == "feral":  # a young package: what contradicts the modes is counted again
+    if solve.backend == "feral":  # a young package: its count is checked when it contradicts the modes
         far = negative_eigenvalues(K - shift * M) or far
-    # what stays negative at any shift is no motion: multipliers, without mass
+    # Lagrange multipliers have no mass: their eigenvalues stay negative at any shift and are no modes
     multipliers = negative_eigenvalues(K + FAR * mean * M) or 0
     below = far - multipliers
     if below == np.count_nonzero(values < shift):
@@ -147,7 +150,10 @@ def _with_missed(
 
 
 def _factorised(matrix: Matrix, dofs: Dofs, say: Say, *, below: bool = True) -> Factorisation:
-    """Factorise ``K − shift M`` of a body; the error of a singular matrix names the free motion or, with a negative shift, the missing mass."""
+    """Factorise ``K − shift M`` of a body.
+
+    The error of a singular matrix names the free motion or, with a negative shift, the missing mass.
+    """
     try:
         return factorise(matrix, say=say)
     except SingularError as error:
@@ -191,14 +197,13 @@ def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) 
 
 
 def connected_parts(*matrices: Matrix) -> list[IntArray]:
-    """Return the index sets of bodies, between which the matrices have no coupling.
+    """Return the index sets of bodies that the matrices do not couple.
 
-    Equal bodies have equal frequencies, of which a Krylov method may miss some; one by one it
-    does not.
+    Equal bodies have equal frequencies. A Krylov method may miss some of them, unless bodies are solved one by one.
     """
     graph = sum(abs(scipy.sparse.csr_array(m)) for m in matrices)
     count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    if count > DENSE:  # a crowd of single masses: dense algebra handles repeated values
+    if count > DENSE:  # very many bodies, mostly single masses: dense algebra finds repeated values
         return [np.arange(len(label))]
     return [np.flatnonzero(label == i) for i in range(count)]
 
@@ -220,19 +225,18 @@ def lowest_modes(
     stiffness, mass
         Real symmetric or complex Hermitian (size, size); the mass may be singular.
     n
-        At most the rank of the mass.
+        Number of modes, at most the rank of the mass.
     solve
-        Solves with ``stiffness − shift · mass`` (`factorise`); not used where dense algebra is
-        faster.
+        Solver with ``stiffness − shift · mass`` from `factorise`; not used where dense algebra is faster.
     shift
-        In rad²/s², at most the lowest square.
+        Shift in rad²/s², at most the lowest square.
     dofs
         Dofs of the coordinates, for messages.
 
     Raises
     ------
     InputError
-        If fewer than `n` motions have mass, where dense algebra sees it.
+        If fewer than `n` motions have mass; only dense algebra detects this.
     """
     if solve is None or _small(stiffness, n):
         K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))
@@ -244,7 +248,7 @@ def lowest_modes(
 
 
 def refuse_bad_mass(structure: Structure, place: str) -> None:
-    """Refuse a mass matrix that is not positive, as far as a cheap check shows it, and implausible numbers.
+    """Refuse implausible numbers, and a mass matrix that a cheap check shows not to be positive.
 
     Raises
     ------
@@ -254,7 +258,7 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
     for name in ("mass", "stiffness"):
         matrix = getattr(structure, name)
         largest = float(abs(matrix).max()) if structure.n else 1.0
-        unstrained = name == "stiffness" and largest == 0.0  # bodies that contacts alone hold
+        unstrained = name == "stiffness" and largest == 0.0  # bodies held by contacts only
         if not (1 / LARGEST_ENTRY < largest < LARGEST_ENTRY or unstrained):
             raise input_error(
                 f"{place}: {name}",
@@ -310,7 +314,7 @@ def usual_shift(structure: Structure) -> float:
 
 
 def _mean_square(structure: Structure) -> float:
-    """Return the mean stiffness over the mean mass of single dofs, in rad²/s²; 1 where no dof has stiffness."""
+    """Return the mean K_ii over the mean M_ii, in rad²/s²; 1 if no dof has stiffness."""
     stiffness, mass = (m.diagonal().real for m in (structure.stiffness, structure.mass))
     return float(abs(stiffness).sum() / mass.sum()) or 1.0
 
@@ -379,7 +383,7 @@ def mass_rank(mass: Matrix) -> int:
 
 
 def _definite(mass: Matrix) -> bool:
-    """Whether no motion is without mass, beyond rounding."""
+    """Whether every motion has mass, beyond rounding."""
     try:
         pivots = np.diagonal(np.linalg.cholesky(mass)).real ** 2
     except np.linalg.LinAlgError:
@@ -388,13 +392,13 @@ def _definite(mass: Matrix) -> bool:
 
 
 def _by_mass(mass: Matrix, dofs: Dofs | None) -> tuple[FloatArray, Matrix, Matrix]:
-    """Return the (r,) masses of motions (size, r) that have one, and the motions (size, size - r) that have none."""
+    """Return the (r,) masses of motions, these motions (size, r), and the motions (size, size - r) without mass."""
     diagonal = np.diagonal(mass).real
     scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = scale[:, None] * mass * scale
     sizes = np.abs(scaled).max(axis=0)
-    if not np.all(np.isfinite(sizes)):  # beside a positive diagonal no number of a positive matrix is so large
+    if not np.all(np.isfinite(sizes)):  # in a positive matrix the diagonal bounds all other entries
         raise _not_positive(np.where(np.isfinite(sizes), 0.0, 1.0), dofs)
     squares, shapes = np.linalg.eigh(scaled)
     if squares[0] < -INDEFINITE * squares[-1]:
@@ -405,7 +409,7 @@ def _by_mass(mass: Matrix, dofs: Dofs | None) -> tuple[FloatArray, Matrix, Matri
 
 
 def _not_positive(motion: Matrix, dofs: Dofs | None) -> InputError:
-    """Return the error of a mass in which a motion (size,) has a negative one."""
+    """Return the error for a mass matrix in which a motion (size,) has negative mass."""
     return input_error(
         "mass",
         f"is not positive: a motion, {_most(motion, dofs)} the most, has a negative one",
@@ -414,9 +418,10 @@ def _not_positive(motion: Matrix, dofs: Dofs | None) -> InputError:
 
 
 def _following(stiffness: Matrix, with_mass: Matrix, without: Matrix, dofs: Dofs | None) -> Matrix:
-    """Return how motions without mass follow those with one statically; those without stiffness, too, stay where they are.
+    """Return the static motion of the coordinates `without` mass under unit motions `with_mass`.
 
-    Refuse multipliers of constraints, which have no stiffness of their own and hold others.
+    Coordinates with neither mass nor stiffness stay at rest. Lagrange multipliers of constraints, which have no stiffness of
+    their own but couple to other coordinates, are refused.
     """
     inner = without.conj().T @ stiffness @ without
     terms = np.sum(abs(without) * (abs(stiffness) @ abs(without)), axis=0)
@@ -438,13 +443,13 @@ def _following(stiffness: Matrix, with_mass: Matrix, without: Matrix, dofs: Dofs
 
 
 def _most(motion: Matrix, dofs: Dofs | None) -> str:
-    """Return the name of the coordinate that moves the most."""
+    """Return the name of the coordinate with the largest motion."""
     at = int(np.argmax(np.abs(motion)))
     return f"coordinate {at}" if dofs is None else dofs.labels[at]
 
 
 def _of_full_rank(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
-    """Solve the reciprocal problem for few modes: of a fine mesh the direct one has the lowest to six digits only."""
+    """Solve the reciprocal problem for few modes: with a fine mesh the direct one gives the lowest to six digits only."""
     few = 2 * n <= len(K)
     try:
         return (_reciprocal if few else _direct)(K, M, n, shift)

@@ -80,7 +80,7 @@ def read_npz(path: Path) -> Arrays:
         raise input_error(str(path), f"is no .npz file ({error})", BROKEN) from error
     except InputError:
         raise
-    # what zipfile, zlib and numpy raise on garbled bytes
+    # exceptions of zipfile, zlib and numpy on garbled bytes
     except _GARBLED as error:
         raise input_error(str(path), f"cannot be read ({error})", BROKEN) from error
 
@@ -116,7 +116,7 @@ def _array_name(entry: zipfile.ZipInfo, path: Path) -> str:
 
 
 def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> npt.NDArray[Any]:
-    """Read one member after its header, which says how much it needs, agrees with its size."""
+    """Read one member, after checking that its header agrees with its size."""
     place = f"{path}: array {entry.filename.removesuffix('.npy')!r}"
     if entry.file_size > DEFLATE_RATIO * max(entry.compress_size, 1):
         raise input_error(place, f"claims {entry.file_size} bytes, more than it can hold", BROKEN)

@@ -26,7 +26,7 @@ Z_AXIS = Axis()
 
 
 class Reducing(Protocol):
-    """Protocol of reductions to some dofs and a few modes: `reduction.Reduction`."""
+    """Protocol of reductions to some dofs and a few modes, such as `reduction.Reduction`."""
 
     def of(self, structure: Structure, keep: IntArray) -> Structure:
         """Return a structure reduced to the dofs `keep` and its modes."""
@@ -125,7 +125,7 @@ class Place:
         return bool(np.linalg.det(self.turn) < 0)
 
     def keeps(self, axis: Axis) -> bool:
-        """Whether it is a rotation about `axis` with a translation along it, so that the axis has the same position relative to the copy."""
+        """Whether the placement is a rotation about `axis` with a translation along it, so that the copy has the same axis."""
         origin = np.asarray(axis.origin, dtype=float)
         near = np.linalg.norm(axis.arm(self.put(origin[None]))) <= 1e-12 * (1 + np.linalg.norm(origin))
         return bool(near and not self.mirrors and np.allclose(self.turn @ axis.unit, axis.unit))
@@ -160,7 +160,7 @@ class Part:
     reduction
         Reduction of the part; None: no reduction.
     damping
-        Damping that replaces the structure's damping matrix; None: that matrix.
+        Damping that replaces the structure's damping matrix; None: the matrix stays.
     template, place
         For a copy: the original part, whose reduction it shares, and its placement; `copy_of` makes one.
     warnings
@@ -188,7 +188,7 @@ class Part:
     warnings: tuple[str, ...] = ()
     clamped_sets: tuple[str, ...] = ()
     own_speed: float = 0.0
-    memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # its reductions
+    memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # reductions already computed
 
     def __repr__(self) -> str:
         """Describe the part in a line."""
@@ -211,7 +211,7 @@ class Part:
 
     @property
     def names(self) -> list[str]:
-        """Names of its surfaces, node sets and sets of dofs."""
+        """Names of the part's surfaces, node sets and sets of dofs."""
         sets = {} if self.mesh is None else self.mesh.node_sets
         return list(dict.fromkeys([*self.surfaces, *sets, *self.structure.sets]))
 
@@ -240,12 +240,18 @@ def solid_part(
 
 
 def structure_part(structure: Structure, **others: Any) -> Part:
-    """Return a part of matrices: lumped masses, a beam, matrices from a reader; `others` as in `solid_part`, and ``mesh`` for pictures."""
+    """Return a part of matrices: lumped masses, a beam, matrices from a reader.
+
+    `others` are as in `solid_part`, and ``mesh`` for pictures.
+    """
     return Part(structure=structure, **others)
 
 
 def rigid_part(body: RigidBody, surfaces: Mapping[str, BodyPoints] | None = None, **others: Any) -> Part:
-    """Return a rigid part, with its contact surfaces by name; pictures show it from these unless it is ``drawn`` otherwise."""
+    """Return a rigid part with its contact surfaces by name.
+
+    Pictures derive its shape from these surfaces, unless `others` contains ``drawn``.
+    """
     own = dict(surfaces or {})
     if others.get("drawn") is None and own:
         points = np.vstack([one.position for one in own.values()])

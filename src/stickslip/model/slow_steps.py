@@ -1,7 +1,8 @@
-"""Lines about steps that take long, so that nobody waits in front of a silent terminal.
+"""Log lines about slow steps, so that the terminal is not silent for long.
 
-A step logs its line when it has run for `AFTER_S`, and only inside `told_when_slow`: logs of runs then do not depend on the speed of the machine.
-Everywhere it reports itself as the stage of the work, a record of progress, which the display repeats when nothing else is written.
+A step logs its line after it has run for `AFTER_S`, but only inside `told_when_slow`: logs of runs then do not depend on the
+speed of the machine. Every step is also recorded as the present stage of the work. The progress display repeats this stage
+when nothing else is written.
 """
 
 import logging
@@ -11,8 +12,8 @@ from contextvars import ContextVar, copy_context
 from threading import Timer
 
 LOG = logging.getLogger("stickslip")
-AFTER_S = 1.0  # wall-clock time before the line
-MANY_DOFS = 20_000  # a step on more says its line at once: a library may not let the timer speak
+AFTER_S = 1.0  # wall-clock time before the line is logged
+MANY_DOFS = 20_000  # a larger step logs its line at once: a library that keeps the interpreter would block the timer
 _CASE: ContextVar[str | None] = ContextVar("case", default=None)
 
 
@@ -33,7 +34,7 @@ def step(text: str, dofs: int = 0) -> Iterator[None]:
     Parameters
     ----------
     text
-        What is being done, with sizes.
+        Description of the step, with sizes.
     dofs
         Number of dofs of the step.
     """

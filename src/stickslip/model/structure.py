@@ -1,4 +1,4 @@
-"""A linear structure: matrices, names of its coordinates, named sets, and the way back to the full model."""
+"""A linear structure: matrices, names of its coordinates, named sets, and the expansion to the full model."""
 
 import re
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ import scipy
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
 
-NAMED = 8  # sets that a short description names
+NAMED = 8  # number of sets that a short description names
 _NUMBERED = re.compile(r"dof[1-9]\d*")
 
 ROTATIONS = ("rx", "ry", "rz")  # components that are angles
@@ -23,7 +23,7 @@ class Dofs:
     Parameters
     ----------
     node
-        (n,) node numbers; -1 for coordinates without a mesh node: modal ones and those of rigid bodies.
+        (n,) node numbers; -1 for coordinates without a mesh node, such as modes and rigid bodies.
     component
         n names: ``x y z rx ry rz`` or ``mode``.
     position
@@ -138,12 +138,12 @@ class Structure:
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are forces of constraints: none (see `LinearSide`)."""
+        """Indices of constraint forces (Lagrange multipliers) among the coordinates: none (see `LinearSide`)."""
         return np.zeros(0, dtype=np.int64)
 
     @property
     def wheel(self) -> None:
-        """No tuned wheel (see `LinearSide`)."""
+        """None: the structure is no tuned wheel (see `LinearSide`)."""
         return None
 
     @property
@@ -153,23 +153,23 @@ class Structure:
 
     @property
     def reduced(self) -> bool:
-        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        """Whether coordinates without contact are condensed (see `LinearSide`)."""
         return True
 
     @property
     def harmonics(self) -> None:
-        """There are matrices for any harmonic (see `LinearSide`)."""
+        """None: the matrices apply to any harmonic (see `LinearSide`)."""
 
     def at_frequency(self, omega: float) -> "Structure":
-        """Return itself at every frequency (see `LinearSide`)."""
+        """Return the structure, which is the same at every frequency (see `LinearSide`)."""
         return self
 
     def of_harmonic(self, harmonic: int) -> "Structure":
-        """Return the structure: it vibrates as itself in every harmonic (see `LinearSide`)."""
+        """Return the structure, which is the same in every harmonic (see `LinearSide`)."""
         return self
 
     def feedback_of(self, harmonic: int) -> None:
-        """No aerodynamic force (see `LinearSide`)."""
+        """Return None: there is no aerodynamic force (see `LinearSide`)."""
 
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
@@ -209,7 +209,7 @@ def join(**parts: Structure) -> Structure:
 
     def stack(which: str) -> Matrix:
         blocks = [getattr(s, which) for s in parts.values()]
-        # parts without loss beside parts with it
+        # some parts may have no loss matrix
         blocks = [np.zeros((s.n, s.n)) if b is None else b for s, b in zip(parts.values(), blocks, strict=True)]
         if any(scipy.sparse.issparse(b) for b in blocks):
             return scipy.sparse.block_diag(blocks, format="csr")

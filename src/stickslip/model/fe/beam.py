@@ -1,9 +1,10 @@
 """Straight uniform beams, slender or with shear, at rest or turning about an axis across them.
 
-Bending is in one plane, or in both, which a straight uniform beam does not couple. With shear the elements interpolate deflection and rotation of the section by the solutions of the static
-equations, so that they do not lock: Z. Friedman and J. B. Kosmatka, "An improved two-node Timoshenko beam finite element", Computers &
-Structures 47 (1993) 473-481. Rotation: D. H. Hodges and M. J. Rutkowski, "Free-vibration analysis of rotating beams by a variable-order
-finite-element method", AIAA Journal 19 (1981) 1459-1466.
+Bending is in one plane or in both; a straight uniform beam does not couple them. With shear, the shape functions of deflection
+and section rotation are solutions of the static equations, so the elements do not lock: Z. Friedman and J. B. Kosmatka, "An
+improved two-node Timoshenko beam finite element", Computers & Structures 47 (1993) 473-481. Rotation: D. H. Hodges and M. J.
+Rutkowski, "Free-vibration analysis of rotating beams by a variable-order finite-element method", AIAA Journal 19 (1981)
+1459-1466.
 """
 
 import math
@@ -24,7 +25,7 @@ End = Literal["clamped", "pinned", "sliding", "free"]
 Direction = Literal["y", "z"]
 Bending = Literal["y", "z", "both"]
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-# deflection, rotation, axial displacement held; an end that slides moves across the beam
+# whether deflection, rotation and axial displacement are held; a sliding end moves across the beam
 HELD = {
     "clamped": (True, True, True),
     "pinned": (True, False, True),
@@ -49,7 +50,7 @@ class Beam:
     second_moment_y
         Second moment of area for deflections along y, if the beam bends both ways; None: equal to `second_moment`.
     material
-        Linear elastic.
+        Linear elastic material.
     shear_coefficient
         κ of the shear stiffness ``κ G A``; Timoshenko beam with rotary inertia. None: Euler-Bernoulli beam.
     ends
@@ -122,8 +123,8 @@ def rotating_beam(
 ) -> Structure:
     """Return the model of a beam on a hub that turns about z, in the rotating frame.
 
-    The centrifugal tension stiffens bending. Spin softening ``- Ω² M`` reduces the stiffness of motion in the plane of rotation, deflections in
-    y (lag) and stretching, but not of deflections in z (flap).
+    The centrifugal tension stiffens bending. Spin softening ``- Ω² M`` reduces the stiffness of motion in the plane of rotation
+    (deflections in y, lag, and stretching), but not of deflections in z (flap).
 
     Parameters
     ----------
@@ -183,7 +184,7 @@ def rotating_beam(
 
 
 def _both(shape: Beam, elements: int, speed: float, hub_radius: float, axial: bool, coriolis: bool) -> Structure:
-    """Return the beam that bends in both planes, node by node; stretching goes with the lag, which Coriolis forces couple to it."""
+    """Return the beam that bends in both planes, dofs node by node; stretching is assembled with lag (Coriolis coupling)."""
     across = replace(shape, second_moment=shape.second_moment_y or shape.second_moment)
     lag = rotating_beam(across, elements, speed, hub_radius=hub_radius, bending="y", axial=axial, coriolis=coriolis)
     flap = rotating_beam(shape, elements, speed, hub_radius=hub_radius, bending="z")
@@ -222,7 +223,7 @@ def _element(
     tension = rA * speed**2 * (hub_radius * (L - x) + 0.5 * (L**2 - x**2))
     w, slope, theta, curvature, strain = _shapes(size, 12 * EI / (shear * size**2))
     u, stretch = _axial_shapes(size)
-    if bending == "z":  # a positive rotation about y lowers what lies along x
+    if bending == "z":  # a positive rotation about y is a negative slope of z along x
         flip = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
         w, slope, theta, curvature, strain = (a * flip for a in (w, slope, theta, curvature, strain))
     weight = size * WEIGHTS
@@ -234,7 +235,7 @@ def _element(
     elastic = integral(curvature, curvature, EI) + integral(stretch, stretch, EA)
     if math.isfinite(shear):
         elastic += integral(strain, strain, shear)
-    # fibres of a section that tilts out of the plane of rotation leave their radius, those of one that turns within it do not
+    # rotary inertia softens a section that tilts out of the plane of rotation, but not one that turns within it
     softening = integral(u, u, rA) + (integral(w, w, rA) if bending == "y" else integral(theta, theta, rI))
     coriolis = np.zeros((6, 6))
     if bending == "y":
@@ -281,7 +282,7 @@ def _placed(values: Sequence[FloatArray], columns: tuple[int, ...]) -> FloatArra
 
 
 def _free(shape: Beam, elements: int, axial: bool) -> IntArray:
-    """Return the dofs that supports leave, in node order."""
+    """Return the unsupported dofs, in node order."""
     held = np.zeros((elements + 1, 3), dtype=bool)
     held[0], held[-1] = (HELD[end] for end in shape.ends)
     if not axial:

@@ -1,8 +1,8 @@
-"""Nested dissection: an order of elimination for the matrices of solid models, from their sparsity alone.
+"""Nested dissection: an order of elimination for the matrices of solid models, from their sparsity pattern.
 
-A. George, "Nested dissection of a regular finite element mesh", SIAM Journal on Numerical Analysis 10 (1973) 345-363. A piece is cut in
-the middle between two vertices far apart, by the difference of the distances from both; the separator is the smallest set of vertices that
-covers the edges of the cut (Kőnig), which a maximum matching gives.
+A. George, "Nested dissection of a regular finite element mesh", SIAM Journal on Numerical Analysis 10 (1973) 345-363. A piece is
+cut midway between two distant vertices, by the difference of the distances from both. The separator is the smallest set of
+vertices that covers the edges of the cut; it follows from a maximum matching (Kőnig's theorem).
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 
-LEAF = 150  # rows of a piece that is not cut any more
-CUTS = (0.5, 0.46, 0.54, 0.42, 0.58)  # shares of a piece in its first half that are tried
-UNEVEN = 4.0  # how many times its own share of the separator's size an uneven cut costs
+LEAF = 150  # largest number of rows of a piece that is not cut
+CUTS = (0.5, 0.46, 0.54, 0.42, 0.58)  # fractions of a piece in its first part that are tried
+UNEVEN = 4.0  # penalty of uneven cuts: a cut costs its separator's size times 1 + UNEVEN (larger fraction − 1/2)²
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,10 @@ def dissected(pattern: Matrix, kept: IntArray) -> Dissection:
 
 
 def _grouped(pattern: Matrix, kept: IntArray) -> tuple[IntArray, list[IntArray], Matrix]:
-    """Return the group of each row, the rows of each, and the graph of groups: rows with the same pattern, as the dofs of a node."""
+    """Group rows with the same pattern, such as the dofs of a node.
+
+    Return the group of each row, the rows of each group, and the graph of groups.
+    """
     n = pattern.shape[0]
     ones = scipy.sparse.csr_array((np.ones(pattern.nnz), pattern.indices, pattern.indptr), shape=(n, n))
     random = np.random.default_rng(0).random(n)
@@ -121,7 +124,7 @@ def _grouped(pattern: Matrix, kept: IntArray) -> tuple[IntArray, list[IntArray],
 
 
 def _cut(graph: Matrix, nodes: IntArray, size: IntArray, pieces: list[tuple[IntArray, tuple[int, ...]]]) -> int:
-    """Append the pieces of `nodes`, the separator after its halves; return its place."""
+    """Append the pieces of `nodes`, the separator after its halves; return the index of the last piece."""
     halves = None
     if size[nodes].sum() > LEAF and nodes.size > 2:
         halves = _halves(graph[nodes][:, nodes])
@@ -135,7 +138,7 @@ def _cut(graph: Matrix, nodes: IntArray, size: IntArray, pieces: list[tuple[IntA
 
 
 def _halves(graph: Matrix) -> tuple[BoolArray, BoolArray, BoolArray] | None:
-    """Return two halves of a graph and the separator between them; None where no cut leaves two."""
+    """Return two parts of a graph and the separator between them; None if every cut leaves a part empty."""
     n = graph.shape[0]
     start = _distances(graph, 0)
     a = int(np.argmax(start))
@@ -160,7 +163,7 @@ def _halves(graph: Matrix) -> tuple[BoolArray, BoolArray, BoolArray] | None:
 
 
 def _distances(graph: Matrix, start: int) -> IntArray:
-    """Return the number of edges from a vertex to all others; what is not connected is nearest."""
+    """Return the number of edges from a vertex to all others; -1 for vertices that are not connected."""
     distance = np.full(graph.shape[0], -1, dtype=np.int64)
     distance[start] = 0
     front, step = np.array([start]), 0
@@ -176,7 +179,7 @@ def _distances(graph: Matrix, start: int) -> IntArray:
 
 
 def _separator(graph: Matrix, inside: BoolArray) -> BoolArray:
-    """Return the fewest vertices without which no edge leads out of `inside`."""
+    """Return the smallest set of vertices whose removal cuts all edges out of `inside`."""
     rows = np.flatnonzero(inside)
     across = graph[rows]
     out = ~inside[across.indices]
@@ -188,7 +191,7 @@ def _separator(graph: Matrix, inside: BoolArray) -> BoolArray:
     match = scipy.sparse.csgraph.maximum_bipartite_matching(edges, perm_type="column")  # of each left vertex
     partner = np.full(right.size, -1)
     partner[match[match >= 0]] = np.flatnonzero(match >= 0)
-    # Kőnig: what alternating paths from unmatched left vertices reach
+    # Kőnig's theorem: the vertices that alternating paths from unmatched left vertices reach
     reached_left, reached_right = match < 0, np.zeros(right.size, dtype=bool)
     front = np.flatnonzero(reached_left)
     while front.size:
@@ -211,7 +214,7 @@ def _symbolic(
     group: IntArray,
     kept: IntArray,
 ) -> Dissection:
-    """Return the fronts with their boundaries."""
+    """Return the dissection: its fronts, and the rows that each of them updates."""
     n = group.size
     place = np.full(len(members), len(pieces))
     for i, (nodes, _) in enumerate(pieces):

@@ -1,6 +1,6 @@
-"""Isoparametric cells: shape functions, quadrature, Jacobians, and where their node blocks go.
+"""Isoparametric cells: shape functions, quadrature, Jacobians, and assembly of their node blocks.
 
-scikit-fem, which knows the shape functions and quadrature rules, is imported only when they are asked for.
+Shape functions and quadrature rules come from scikit-fem, which is imported at first use.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, missing_package
 from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
 
-CHUNK = 200_000  # cells x quadrature points x nodes worked on at once: 20 to 100 MB
+CHUNK = 200_000  # cells x quadrature points x nodes in one chunk: 20 to 100 MB
 TET_PLACES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 HEX_PLACES = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
@@ -69,7 +69,7 @@ class Shape:
     values
         (q, k) values.
     slopes
-        (q, k, 3) derivatives by the reference coordinates.
+        (q, k, 3) derivatives with respect to the reference coordinates.
     weights
         (q,) weights, whose sum is the volume of the reference cell.
     """
@@ -117,7 +117,7 @@ def shape_functions(width: int, degree: int) -> Shape:
 
 
 def chunks(mesh: SolidMesh, shape: Shape) -> Iterator[slice]:
-    """Yield slices of the cells, short enough that arrays stay small."""
+    """Yield slices of the cells, each of at most `CHUNK` values."""
     step = max(1, CHUNK // shape.values.size)
     for start in range(0, len(mesh.cells), step):
         yield slice(start, min(start + step, len(mesh.cells)))
@@ -131,7 +131,7 @@ def gradients(mesh: SolidMesh, shape: Shape, piece: slice) -> tuple[FloatArray, 
 
 
 def _jacobians(mesh: SolidMesh, shape: Shape, piece: slice) -> FloatArray:
-    """Return (m, q, 3, 3) derivatives of positions (third axis) by reference coordinates (last axis)."""
+    """Return (m, q, 3, 3) derivatives of positions (third axis) with respect to reference coordinates (last axis)."""
     corners = mesh.points[mesh.cells[piece]]
     return np.asarray(np.einsum("qkr,mkx->mqxr", shape.slopes, corners, optimize=True))
 
@@ -141,7 +141,7 @@ def check_jacobians(mesh: SolidMesh, shape: Shape) -> None:
     bad: list[int] = []
     for piece in chunks(mesh, shape):
         jacobian = _jacobians(mesh, shape, piece)
-        # relative to a cube with the cell's edges, so that small cells are not taken for flat ones
+        # relative to a cube with the cell's edges: small cells are then not mistaken for flat ones
         size = np.linalg.norm(jacobian, axis=(2, 3)) ** 3
         flat = np.linalg.det(jacobian) <= 1e-12 * size
         bad.extend(piece.start + np.flatnonzero(flat.any(axis=1)))
@@ -169,14 +169,14 @@ class NodeBlocks:
     mesh
         Mesh whose cells define the pairs.
     kept
-        (n,) whether a node's rows and columns are assembled.
+        (n,) True for nodes whose rows and columns are assembled.
     """
 
     def __init__(self, mesh: SolidMesh, kept: BoolArray) -> None:
         self.n = int(kept.sum())
         new = np.where(kept, np.cumsum(kept) - 1, -1)[mesh.cells]
         rows, columns = new[:, :, None], new[:, None, :]
-        outside = self.n**2  # one place for all that is dropped
+        outside = self.n**2  # common index of all dropped entries
         pair = np.where((rows < 0) | (columns < 0), outside, rows * self.n + columns)
         pairs, place = np.unique(pair.ravel(), return_inverse=True)
         self._place = place.astype(np.int32).reshape(len(mesh.cells), -1)

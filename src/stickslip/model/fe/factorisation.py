@@ -1,4 +1,4 @@
-"""Factorisations of structural matrices: one function from a matrix to the map that solves with it."""
+"""Factorisations of structural matrices, with one function for all backends."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -14,14 +14,14 @@ from stickslip.errors import SingularError, StickslipError, input_error, missing
 from stickslip.model.fe.multifrontal import multifrontal
 
 DENSE = 400  # below this many rows dense algebra is faster than sparse
-MIN_FERAL_ROWS = 3000  # below this many rows SuperLU is as fast as the optional package
+MIN_FERAL_ROWS = 3000  # below this many rows SuperLU is as fast as the optional package feral
 HUGE = 20_000  # below this many rows SuperLU is as fast as the multifrontal method
-SINGULAR = 1e13  # a condition number above which nothing of a solution is known
-SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
+SINGULAR = 1e13  # condition number above which a solution has no reliable digit
+SYMMETRIC = 1e-10  # asymmetry over the largest entry, below which a matrix counts as Hermitian
 PIVOTS = 0.01  # SuperLU leaves the diagonal for a pivot more than a hundred times as large
-RESIDUAL = 1e-9  # of each equation, over the sum of its terms: factors of feral that solve no better are not used
-MAX_CHECKED_ROWS = 100_000  # rows up to which SuperLU counts again what feral has counted
-MAX_COUNTED_ENTRIES = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
+RESIDUAL = 1e-9  # residual of an equation over the sum of its terms, above which factors of feral are not used
+MAX_CHECKED_ROWS = 100_000  # rows up to which SuperLU checks the number of negative eigenvalues from feral
+MAX_COUNTED_ENTRIES = 50_000_000  # largest number of entries of factors that are copied to count pivots: 0.6 GB
 BACKENDS = ("auto", "dense", "multifrontal", "superlu", "feral")
 
 LOG = logging.getLogger("stickslip")
@@ -30,7 +30,7 @@ Say = Callable[[str], None]
 
 
 class _DistrustedError(Exception):
-    """Factors of the package feral are unreliable; the message says why."""
+    """Error: factors of the package feral are unreliable; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Factorisation:
     Parameters
     ----------
     solve
-        Takes (n,) or (n, k), real or complex, and returns the same shape.
+        Solver for right-hand sides (n,) or (n, k), real or complex; it returns the same shape.
     backend
         Method of factorisation: ``dense``, ``multifrontal``, ``superlu`` or ``feral``.
     count
@@ -62,11 +62,11 @@ class Factorisation:
 
 
 def silent(_: str) -> None:
-    """Ignore the sentence: default of functions that report their progress."""
+    """Ignore the sentence; default for functions that report their progress."""
 
 
 def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Factorisation:
-    """Factorise a square matrix; return the map from right-hand sides to solutions.
+    """Factorise a square matrix.
 
     Parameters
     ----------
@@ -74,8 +74,9 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         (n, n), dense or sparse, real or complex: symmetric, Hermitian or general.
     backend
         ``dense``; ``multifrontal`` (real symmetric and complex Hermitian, positive definite); ``superlu`` (SciPy's); ``feral``
-        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest applicable one that is installed,
-        and SuperLU, with a warning, if feral fails, finds a vanishing pivot, or solves with too large a residual.
+        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest applicable one that is
+        installed. If feral fails, finds a vanishing pivot, or solves with too large a residual, ``auto`` takes SuperLU, with a
+        warning.
     say
         Called with a sentence before a long factorisation.
 
@@ -111,7 +112,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
 
 
 def _chosen(matrix: Matrix, backend: str) -> str:
-    """Return the name of what factorises `matrix`."""
+    """Return the name of the backend for `matrix`."""
     if backend not in BACKENDS:
         raise input_error("factorise: backend", f"got {backend!r}", f"Use one of {', '.join(BACKENDS)}.")
     if backend in ("feral", "multifrontal") and not _hermitian(matrix):
@@ -133,7 +134,7 @@ def _chosen(matrix: Matrix, backend: str) -> str:
 
 
 def _has_feral() -> bool:
-    """Whether the package is there; a folder of its name in the working directory has no origin."""
+    """Whether feral is installed; a folder of the same name in the working directory has no origin and does not count."""
     spec = find_spec("feral")
     return spec is not None and spec.origin is not None
 
@@ -174,7 +175,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
         chosen = "superlu"
     if chosen == "dense":
         whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
-        whole = (whole + whole.conj().T) / 2  # a diagonal real to the last digit
+        whole = (whole + whole.conj().T) / 2  # makes the diagonal exactly real
         blocks = scipy.linalg.ldl(whole, hermitian=True)[1]  # of one or two rows
         beside = np.abs(np.diag(blocks, -1))
         signs = scipy.linalg.eigvalsh_tridiagonal(np.diag(blocks).real, beside)
@@ -185,7 +186,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
 
 
 def _by_superlu(matrix: Matrix) -> int | None:
-    """Count with all pivots on the diagonal, so that their signs count."""
+    """Count negative pivots with SuperLU, all on the diagonal: only then do their signs count eigenvalues."""
     try:
         return _superlu(matrix, threshold=0.0).negative
     except SingularError:
@@ -193,7 +194,7 @@ def _by_superlu(matrix: Matrix) -> int | None:
 
 
 def _by_feral(matrix: Matrix, say: Say) -> int | None:
-    """Count with feral, and up to `MAX_CHECKED_ROWS` rows with SuperLU again, which is believed where they differ."""
+    """Count negative pivots with feral; up to `MAX_CHECKED_ROWS` rows, check with SuperLU, which is trusted if they differ."""
     try:
         found = _feral(matrix).negative
     except (SingularError, _DistrustedError) as error:
@@ -211,7 +212,7 @@ def _by_feral(matrix: Matrix, say: Say) -> int | None:
 
 
 def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
-    """Factorise a real or complex matrix."""
+    """Factorise a real or complex matrix with SuperLU."""
     from scipy.sparse.linalg import splu
 
     try:
@@ -232,12 +233,12 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
 
 
 def _multifrontal(matrix: Matrix) -> Factorisation:
-    """Factorise a Hermitian positive definite matrix."""
+    """Factorise a Hermitian positive definite matrix with the multifrontal method."""
     return Factorisation(multifrontal(matrix.tocsr()).solve, "multifrontal", lambda: 0)
 
 
 def _feral(matrix: Matrix) -> Factorisation:
-    """Factorise a real symmetric or, as a real matrix of twice the size, a Hermitian matrix.
+    """Factorise a symmetric matrix with feral, or a Hermitian one as a real matrix of twice the size.
 
     Raises
     ------
@@ -262,7 +263,7 @@ def _of_feral(feral: Matrix, matrix: Matrix) -> Factorisation:
     if not np.iscomplexobj(matrix):
         own = _factored(feral, matrix)
         return Factorisation(_of_complex(own.solve), "feral", lambda: own.num_negative_eigenvalues)
-    real, imaginary = matrix.real, matrix.imag.copy()  # else zeros vanish from `matrix`, too
+    real, imaginary = matrix.real, matrix.imag.copy()  # without the copy, zeros would be removed from `matrix` as well
     imaginary.eliminate_zeros()
     doubled = scipy.sparse.block_array([[real, -imaginary], [imaginary, real]], format="csc")
     solver, n = _factored(feral, doubled), matrix.shape[0]
@@ -277,7 +278,7 @@ def _of_feral(feral: Matrix, matrix: Matrix) -> Factorisation:
 def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
     """Return the package's solver of a real symmetric CSC matrix.
 
-    One thread: a study has a process for each core. Fused multiply-add changes the last digits only.
+    It uses one thread, since a study has a process for each core. Fused multiply-add changes only the last digits.
     """
     lower = scipy.sparse.tril(matrix, format="csc")
     lower.sort_indices()
@@ -293,7 +294,7 @@ def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
 
 @contextmanager
 def _failures_of(feral: Matrix) -> Iterator[None]:
-    """Convert errors of the package into a failed factorisation; a panic of Rust is no `Exception`."""
+    """Convert errors of feral into a `_DistrustedError`; a Rust panic is a `BaseException`, but no `Exception`."""
     try:
         yield
     except BaseException as error:
@@ -303,10 +304,13 @@ def _failures_of(feral: Matrix) -> Iterator[None]:
 
 
 def _residual(matrix: Matrix, solve: Solve) -> float:
-    """Return by which share the entries must change to explain the solution of random equations (Oettli & Prager 1964)."""
+    """Return the backward error of a random system: the relative change of the entries that makes its solution exact.
+
+    Componentwise backward error of Oettli & Prager (1964).
+    """
     size = np.sqrt(np.asarray(abs(matrix).sum(axis=1)).ravel())
     right = size * np.random.default_rng(1).standard_normal(matrix.shape[0])
-    with np.errstate(all="ignore"):  # an overflow is judged by who asks
+    with np.errstate(all="ignore"):  # the caller judges an overflow
         answer = solve(right)
         terms = abs(matrix) @ abs(answer) + abs(right)
         return float(np.max(abs(matrix @ answer - right) / terms))
@@ -317,7 +321,7 @@ def _warn(why: object) -> None:
 
 
 def _of_complex(solve: Solve) -> Solve:
-    """Let the factors of a real matrix take complex right-hand sides."""
+    """Extend the solver of a real matrix to complex right-hand sides."""
 
     def both(b: Matrix) -> Matrix:
         if np.iscomplexobj(b):

@@ -1,4 +1,4 @@
-"""The static state of a rotating solid that nothing holds: a ring in a groove, a damper of finite elements below platforms."""
+"""Static state of an unconstrained rotating solid, such as a ring in a groove or a finite-element damper below platforms."""
 
 import numpy as np
 import scipy
@@ -8,10 +8,10 @@ from stickslip.errors import SingularError
 from stickslip.model.fe.factorisation import Solve, factorise
 from stickslip.model.fe.rotation import RotatingSolid
 
-ROUNDING_FORCE = 1e-9  # force on a dof over the sum of its terms' magnitudes: below, it is rounding
-# Displacement by which two faces that are tied differ, over the largest of a rigid motion: below, they differ because the file
-# writes few digits of the coordinates (5 or more), above, because the tie hinders the motion (a sector's translation across
-# the axis by 2 sin(pi/n) for n sectors, 3e-3 for 2000)
+ROUNDING_FORCE = 1e-9  # force on a dof over the sum of its terms' magnitudes: less is rounding
+# Mismatch of two tied faces in a rigid motion, over its largest displacement. Below this value the mismatch comes from
+# coordinates with few digits (5 or more) in the file. Above it the tie hinders the motion: a translation of a sector across
+# the axis has a mismatch of 2 sin(pi/n) for n sectors, 3e-3 for 2000.
 MISMATCH = 2e-4
 
 
@@ -37,7 +37,7 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
     Raises
     ------
     SingularError
-        If it can move without strain in a way that is no rigid motion.
+        If the solid has a motion without strain that is not rigid.
     """
     free = rigid_motions(solid, tie)
     if not free.shape[1]:
@@ -51,7 +51,7 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
     if tie is not None:
         load, own = tie.T @ load, _on(tie, free)
         stiffness = tie.T @ stiffness @ tie
-    # as many coordinates are held as there are rigid motions: the load is in balance, and no reaction arises
+    # as many coordinates are held as there are rigid motions: the load is in equilibrium, so reactions vanish
     _, _, order = scipy.linalg.qr(own.T, mode="economic", pivoting=True)
     rest = np.sort(order[own.shape[1] :])
     moved = np.zeros(own.shape[0])
@@ -75,8 +75,8 @@ def _held(stiffness: Matrix) -> Solve:
 def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray:
     """Return the (n, k) rigid motions that neither supports nor the tie prevent; k from 0 to 6.
 
-    Elements do not resist rigid motions, whatever the rounding of their nodes. A tie between faces with rounded nodes
-    does, in proportion to their mismatch. Supports and tie therefore have different thresholds.
+    Elements never resist rigid motions, even with rounded coordinates. A tie between faces with rounded coordinates does, in
+    proportion to the mismatch. Supports and tie therefore have different thresholds.
     """
     places = solid.mesh.points[solid.free]
     size = float(np.linalg.norm(np.ptp(places, axis=0)))
@@ -99,7 +99,7 @@ def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray
 
 
 def _on(tie: Matrix, motions: FloatArray) -> FloatArray:
-    """Return the (m, k) coordinates of admissible displacements that are nearest to motions (n, k)."""
+    """Return the (m, k) coordinates of the admissible displacements nearest to `motions` (n, k)."""
     square = scipy.sparse.csr_array(tie.T @ tie)
     solve = factorise(square)
     return np.column_stack([solve(np.asarray(tie.T @ column)) for column in motions.T])

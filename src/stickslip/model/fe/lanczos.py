@@ -13,13 +13,13 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import Solve
 
-BLOCK = 8  # vectors solved for together
+BLOCK = 8  # vectors of a block
 CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
-PROBE = 2  # new directions that look for equal frequencies beyond the eight
-STEPS = 5  # with them
-KNOWN = 1e-10  # a change of an eigenvalue above which they have found one
-ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
-ROUNDING_SQUARES = (1e-24, 1e-12)  # squared length over the largest, at first and once normalised: only rounding
+PROBE = 2  # random directions added after convergence, to find repeated frequencies that the blocks missed
+STEPS = 5  # steps with these directions before the next check
+KNOWN = 1e-10  # relative change of an eigenvalue above which these directions have found a new one
+ROUNDING = 1e-14  # smallest attainable residual over the largest eigenvalue; also the threshold of the rank
+ROUNDING_SQUARES = (1e-24, 1e-12)  # squared length over the largest, before and after normalisation: less is rounding
 
 
 def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tuple[FloatArray, Matrix]:
@@ -82,7 +82,7 @@ def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tup
             before, pause = largest, STEPS
             probe = _without(mass, fresh(min(PROBE, size)), known)
             block, heavy = _orthonormal(mass, probe, known, fresh)[:2]
-        elif found and block.shape[1] < BLOCK:  # there may be many more
+        elif found and block.shape[1] < BLOCK:  # more equal frequencies may follow
             more = _without(mass, fresh(BLOCK - block.shape[1]), known)
             block, heavy = _orthonormal(mass, np.hstack([block, more]), known, fresh)[:2]
     rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
@@ -101,7 +101,7 @@ def _largest(projected: Matrix, n: int) -> tuple[FloatArray, Matrix]:
 
 
 def _without(mass: Matrix, block: Matrix, known: Matrix) -> Matrix:
-    """Return `block` without its share in the M-orthonormal `known`."""
+    """Return `block` without its M-orthogonal projection on the orthonormal vectors `known`."""
     return block - known @ (known.conj().T @ (mass @ block))
 
 
@@ -128,10 +128,10 @@ def _bordered(projected: Matrix, column: Matrix) -> Matrix:
 def _orthonormal(
     mass: Matrix, image: Matrix, known: Matrix, fresh: Callable[[int], Matrix]
 ) -> tuple[Matrix, Matrix, Matrix]:
-    """Return M-orthonormal columns of `image`, which was made M-orthogonal to `known` once, their products with M, and ``M @ image``.
+    """Return M-orthonormal columns of `image`, their products with M, and ``M @ image``.
 
-    That left rounding errors of the size of what was removed, hence once more. Columns of nothing
-    but such errors give way to new directions, as long as there are any.
+    `image` is already M-orthogonal to `known`, up to rounding errors of the size of the part removed, so it is
+    orthogonalised again. Columns that consist of such errors only are replaced by new directions, as long as there are any.
     """
     block, added = image, False
     heavy = of_image = mass @ block

@@ -13,8 +13,8 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError
 from stickslip.model.fe.dissection import Dissection, Front, dissected
 
-COLUMNS = 32  # right-hand sides solved for together
-BLOCK = 256  # columns added together
+COLUMNS = 32  # right-hand sides of one pass
+BLOCK = 256  # columns added at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class Multifrontal:
         return complex if np.iscomplexobj(right) or np.iscomplexobj(self.rest) else float
 
     def _flat(self, x: Matrix) -> Matrix:
-        """Return complex columns as pairs of real ones where the factors are real; the same memory."""
+        """Return complex columns as pairs of real ones if the factors are real, without a copy."""
         return x if np.iscomplexobj(self.rest) else x.view(float)
 
 
@@ -158,14 +158,14 @@ def _assembled(
 
 
 def _add(to: Matrix, rows: IntArray, columns: IntArray, values: Matrix) -> None:
-    """Add to rows and columns of an array, some columns at a time: the largest ones are copied nowhere."""
+    """Add `values` to rows and columns of an array, `BLOCK` columns at a time, so that no large copy is made."""
     for first in range(0, columns.size, BLOCK):
         some = slice(first, first + BLOCK)
         to[np.ix_(rows, columns[some])] += values[:, some]
 
 
 def _local(front: Front, rows: IntArray) -> IntArray:
-    """Return the places of rows in a front."""
+    """Return the positions of rows in a front."""
     inside = rows < front.last
     after = front.pivots + np.searchsorted(front.update, rows)
     return np.where(inside, rows - front.first, after)
@@ -194,14 +194,14 @@ def _subtract_square(update: Matrix, under: Matrix) -> None:
 
 
 def _mirrored(lower: Matrix) -> Matrix:
-    """Return the Hermitian matrix of a lower triangle, row by row: it may be large."""
+    """Complete a lower triangle to the Hermitian matrix, row by row, since it may be large."""
     for i in range(1, len(lower)):
         lower[:i, i] = lower[i, :i].conj()
     return lower
 
 
 def _solve(lower: Matrix, rows: Matrix, transposed: bool) -> None:
-    """Solve with a triangle, or its conjugate transpose, in the place of `rows` (p, m) in C order."""
+    """Solve with a triangle, or its conjugate transpose; the solution overwrites `rows` (p, m) in C order."""
     trsm = scipy.linalg.blas.ztrsm if np.iscomplexobj(lower) else scipy.linalg.blas.dtrsm
     if not transposed:
         # xᵀ Lᵀ = bᵀ

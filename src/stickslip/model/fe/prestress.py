@@ -1,4 +1,4 @@
-"""Stress stiffening: strain energy of a loaded elastic solid to second order.
+"""Stress stiffening: tangent stiffness of a loaded elastic solid.
 
 St. Venant-Kirchhoff's law, total Lagrangian: Green strain, second Piola-Kirchhoff stress ``λ tr(E) I + 2 G E``.
 """
@@ -17,7 +17,7 @@ PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]  # rows of a strain vec
 
 @dataclass(frozen=True, eq=False)
 class PrestressTerms:
-    """Parts of the tangent stiffness at a displacement u; the stiffness at rest is not among them.
+    """Terms of the tangent stiffness at a displacement u, without the stiffness at rest.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class PrestressTerms:
     quadratic
         (n, n) initial-displacement terms quadratic in u.
     geometric
-        (n, n) stress stiffness: linear in u where the stress is that of linear elasticity.
+        (n, n) stress stiffness: linear in u if the stress follows from linear elasticity.
     """
 
     linear: Matrix

@@ -1,4 +1,4 @@
-"""Elastic solids that rotate: centrifugal load, its static displacement, and the matrices of small vibrations about it.
+"""Rotating elastic solids: centrifugal load, static displacement under it, and matrices of small vibrations about this state.
 
 In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
 """
@@ -51,13 +51,13 @@ class SpeedPolynomial:
         return scipy.sparse.csr_array(stiffness)
 
     def by_square(self, speed: float) -> Matrix:
-        """Return the derivative of the stiffness by Ω² in N s²/m at `speed` in rad/s."""
+        """Return the derivative of the stiffness with respect to Ω², in N s²/m, at `speed` in rad/s."""
         return self.square if self.fourth is None else self.square + 2.0 * speed**2 * self.fourth
 
 
 @dataclass(frozen=True, eq=False)
 class RotatingSolid:
-    """An elastic solid about an axis of rotation; `rotating_solid` makes one.
+    """An elastic solid that rotates about an axis; `rotating_solid` makes one.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class RotatingSolid:
         return self._of_mass(self.axis.cross)
 
     def _of_mass(self, block: FloatArray) -> Matrix:
-        """Return the matrix with a share of `block` (3, 3) for each pair of nodes."""
+        """Return the matrix with `block` (3, 3), times the nodal mass, for each pair of nodes."""
         return self._of_dofs(scipy.sparse.kron(self.nodal_mass, block, format="csr"))
 
     @property
@@ -113,7 +113,7 @@ class RotatingSolid:
         return full.reshape(-1, 3)
 
     def _of_dofs(self, matrix: Matrix) -> Matrix:
-        """Return a matrix of the x, y, z of all nodes, or of all free nodes, without the components that are held."""
+        """Remove supported components from a matrix of the x, y, z of all nodes or of all free nodes."""
         index = self.moving
         if matrix.shape[0] < self.mesh.points.size:
             index = np.searchsorted(node_dofs(np.flatnonzero(self.free)), index)
@@ -300,7 +300,7 @@ def rotating_solid(
     Raises
     ------
     InputError
-        As `assemble_solid` does.
+        As in `assemble_solid`.
     """
     mass, stiffness = integrate(mesh, material, quadrature)
     structure, moving = support(mesh, mass, stiffness, clamped, held)
@@ -311,7 +311,7 @@ def rotating_solid(
 
 
 def _content(tie: Matrix | None) -> str:
-    """Return a name that two ties share only if they are equal; sectors make theirs anew each time."""
+    """Return a hash of a tie: sectors make their ties anew each time, so identity does not tell equal ones."""
     if tie is None:
         return ""
     tie = scipy.sparse.csr_array(tie)

@@ -17,7 +17,7 @@ from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
 from stickslip.model.structure import Structure, nodal_dofs
 from stickslip.units import check_quantities, quantity
 
-CUT_FACES = ("cyclic_low", "cyclic_high")  # these sets may lose nodes to a clamp
+CUT_FACES = ("cyclic_low", "cyclic_high")  # sets whose clamped nodes are removed; other sets must have none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +91,7 @@ def assemble_solid(
 
 
 def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
-    """Return which nodes (n,) belong to the node sets named `clamped`; ``root`` need not be there."""
+    """Return a mask (n,) of the nodes in the node sets named `clamped`; ``root`` may be missing."""
     held = np.zeros(len(mesh.points), dtype=bool)
     for name in clamped:
         if name in mesh.node_sets:
@@ -188,8 +188,8 @@ def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Materia
 def _integrate(mesh: SolidMesh, material: Material, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
     """Integrate a body of one material.
 
-    Both matrices are put together from scalar integrals, ``∫ φ_p φ_q`` and ``∫ ∂_a φ_p ∂_b φ_q``:
-    ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. That costs a fraction of the vector-valued form.
+    Both matrices are built from scalar integrals, ``∫ φ_p φ_q`` and ``D_ab = ∫ ∂_a φ_p ∂_b φ_q``:
+    ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. This costs a fraction of the vector-valued form.
     """
     bases, theirs = _bases(mesh, quadrature)
 
@@ -230,7 +230,7 @@ def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], Int
     skfem = library()
     width = mesh.cells.shape[1]
     element, order = library_element(width)
-    # the geometry has the shape functions of the displacement: affine on linear tetrahedra alone
+    # isoparametric: geometry and displacement have the same shape functions, affine only on linear tetrahedra
     grid = (skfem.MeshTet1 if width in (4, 10) else skfem.MeshHex1)(
         np.ascontiguousarray(mesh.points.T),
         np.ascontiguousarray(mesh.cells[:, order].T),
@@ -258,7 +258,7 @@ def check_shared(mesh: SolidMesh) -> None:
     _, first, edge = np.unique(key, return_index=True, return_inverse=True)
     is_corner = np.zeros(len(mesh.points), dtype=bool)
     is_corner[mesh.cells[:, :corners]] = True
-    # of all edges that a node is the middle of, the last one stays here: the others differ from it
+    # a node in the middle of several edges keeps the last one here, so the others differ from it
     owner = np.zeros(len(mesh.points), dtype=np.int64)
     owner[middle] = edge
     wrong = (middle[first][edge] != middle) | is_corner[middle] | (owner[middle] != edge)

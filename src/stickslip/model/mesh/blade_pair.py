@@ -1,4 +1,4 @@
-"""Two equal cantilever blades with platforms: their geometry, and their mesh of second-order tetrahedra.
+"""Two equal cantilever blades with platforms: geometry, and mesh of second-order tetrahedra.
 
 Coordinates: x circumferential (the blades bend this way), y axial, z radial. Blade 1 stands at
 x = 0, blade 2 at x = `pitch`.
@@ -42,10 +42,10 @@ class BladePair:
     platform_edge
         Thickness of the platform at its edges.
     flat_angle, curved_angle
-        Inclination from x of the underside that faces +x (blade 1: the damper's flat side) and of
-        the one that faces −x (blade 2: its curved side).
+        Inclination from x of the underside that faces +x (on blade 1, touched by the damper's flat side) and of the one that
+        faces −x (on blade 2, touched by its curved side).
     airfoil_length
-        From the platform's top to the tip.
+        Length from the platform's top to the tip.
     hub_chord, tip_chord, hub_thickness, tip_thickness
         Size of the airfoil's end sections.
     camber
@@ -112,7 +112,7 @@ class BladePair:
         self._check_force()
 
     def _check_force(self) -> None:
-        """Refuse a place on the shank so near to one of its ends that only slivers fit between."""
+        """Refuse a force node so near to an end of the shank that only sliver elements fit between."""
         top = self.shank_tops[1]
         place, least = (1.0 + self.force_span) * top, self.foot_size / 20
         if self.force_span < 0.0 and not least <= place <= top - least:
@@ -164,7 +164,7 @@ def _bad(name: str, problem: str, remedy: str) -> InputError:
     return input_error(f"BladePair.{name}", problem, remedy)
 
 
-MATCH = 1e-9  # m: a contact point and its node may differ by this much
+MATCH = 1e-9  # m: largest distance of a node from its contact point
 
 
 def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
@@ -251,7 +251,7 @@ def check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
 
 
 def _force_place(geometry: BladePair) -> FloatArray:
-    """Return where the force node is (3,): on the airfoil's pressure side or on the shank's face away from the damper."""
+    """Return the position of the force node (3,): on the airfoil's pressure side or on the shank's face away from the damper."""
     if geometry.force_span >= 0.0:
         return np.asarray(_section(geometry, geometry.force_span)[7])
     height = (1.0 + geometry.force_span) * geometry.shank_tops[1]
@@ -297,7 +297,7 @@ def _underside(geometry: BladePair, points: FloatArray, side: int) -> IntArray:
 
 
 def _match(points: FloatArray, targets: FloatArray) -> IntArray:
-    """Return the node at each target; a mesh without one is an error of the mesher."""
+    """Return the node at each target; a missing node is an error of the mesher."""
     from scipy.spatial import cKDTree
 
     distance, nearest = cKDTree(points).query(targets)
@@ -345,12 +345,12 @@ def _wire(occ: Any, section: FloatArray) -> int:
 
 
 def _embed(gmsh: Any, targets: FloatArray) -> None:
-    """Make every target a point of the plane face that holds it, so that it becomes a node."""
+    """Embed every target in the plane face that contains it, so that it becomes a node."""
     on_face: dict[int, list[int]] = {}
     faces = [tag for _, tag in gmsh.model.getEntities(2)]
 
     def holds(face: int, target: FloatArray) -> bool:
-        # isInside projects on the face first: the distance has to be asked for as well
+        # isInside projects on the face first, so the distance is checked as well
         closest, _ = gmsh.model.getClosestPoint(2, face, list(target))
         near = np.abs(np.array(closest) - target).max() < MATCH
         return bool(near and gmsh.model.isInside(2, face, list(target)))

@@ -1,10 +1,10 @@
-"""Coarse skins for pictures: points of the fine one."""
+"""Coarse skins for pictures, made of points of the fine skin."""
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 
-_GROWTH = 1.12  # of the cell from try to try
+_GROWTH = 1.12  # growth of the cell size from one trial to the next
 
 
 def coarse_skin(points: FloatArray, triangles: IntArray, most: int) -> tuple[IntArray, IntArray]:
@@ -24,7 +24,7 @@ def coarse_skin(points: FloatArray, triangles: IntArray, most: int) -> tuple[Int
     kept
         (m,) points of the fine skin that remain, one of each cell, the nearest to its centroid.
     triangles
-        (j, 3) positions in `kept`; those that have shrunk to a line or lie on each other are dropped.
+        (j, 3) points of each triangle, as indices into `kept`; triangles that have shrunk to a line or coincide are dropped.
     """
     used = np.unique(triangles)
     place = np.full(len(points), -1, dtype=np.int64)

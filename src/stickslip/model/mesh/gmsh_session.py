@@ -1,4 +1,4 @@
-"""gmsh, imported only when a mesh is made, and what its models share."""
+"""A gmsh session, imported only when a mesh is made, with settings that all our meshes share."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -29,7 +29,7 @@ def gmsh_session() -> Iterator[Any]:
         raise missing_package("gmsh", error, "fe") from error
     ours = not gmsh.isInitialized()
     if ours:
-        # signal handlers may only be set in the main thread: do without them
+        # interruptible=False: signal handlers may only be set in the main thread
         gmsh.initialize(readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.option.setNumber("General.NumThreads", 1)

@@ -13,7 +13,7 @@ from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.units import angle, check_quantities, length, quantity, table
 
-SECTION_POINTS = 7  # on either face of the airfoil
+SECTION_POINTS = 7  # points on either face of an airfoil section
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ class Airfoil:
     Parameters
     ----------
     airfoil_length
-        From the platform's top (without platform: from the rim) to the tip.
+        Length from the platform's top (without platform: from the rim) to the tip.
     hub_chord, tip_chord, hub_thickness, tip_thickness
         Size of the end sections.
     camber
@@ -168,7 +168,7 @@ class Airfoil:
 
 @dataclass(frozen=True, kw_only=True)
 class Shroud:
-    """A ring segment on the blade whose faces touch, or nearly touch, those of the neighbours; metres and rad.
+    """A ring segment on the blade whose faces touch, or nearly touch, the neighbours' faces; metres and rad.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ class BladedSector:
         return sections
 
     def _sunk(self, half_width: float) -> float:
-        """Return the x at which something `half_width` wide to either side is inside the rim."""
+        """Return the radius x at which a body `half_width` wide to either side can start, safely inside the rim."""
         rim = self.disk.rim_radius
         return math.sqrt(max(rim**2 - half_width**2, 0.0)) - 0.1 * self.disk.rim_height
 
@@ -399,7 +399,7 @@ def _turned_y(radius: float, y: FloatArray, angle: float) -> FloatArray:
 
 
 def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
-    """Return which `points` (n, 2) lie inside the `polygon` (p, 2), by counting crossings."""
+    """Return a mask of the `points` (n, 2) inside the `polygon` (p, 2), by counting crossings."""
     x, y = points[:, :1], points[:, 1:]
     (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
     spans = (y0 > y) != (y1 > y)

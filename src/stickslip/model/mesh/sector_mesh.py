@@ -14,15 +14,15 @@ from stickslip.model.mesh.gmsh_session import gmsh_session, quadratic_tetrahedra
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
-ON_FACE = 1e-7  # m: how far gmsh's nodes and centres may be from their surface
-MOVED = 1e-8  # m: how far a node may be moved to make the faces match to the last bits
+ON_FACE = 1e-7  # m: largest distance of gmsh's nodes and centres from their surface
+MOVED = 1e-8  # m: largest move of a node that makes the two faces match exactly
 TET10 = 11  # gmsh's number of the element type
-FLATTEST = 1e-3  # volume of a tetrahedron over that of a regular one with its longest edge
+FLATTEST = 1e-3  # smallest volume of a tetrahedron over the volume of a regular one with its longest edge
 
 
 @dataclass(frozen=True)
 class _FacePair:
-    """Two faces (gmsh's tags) of which the second is the first, turned by `angle` about z."""
+    """Two faces (gmsh's tags); the second is the first, turned by `angle` about z."""
 
     name: str
     low: int
@@ -44,7 +44,7 @@ def mesh_sector(geometry: BladedSector) -> SolidMesh:
         With the node sets ``root`` (the bore), ``cyclic_low`` and ``cyclic_high`` (faces at minus and plus half the pitch),
         ``tip``, with a platform ``platform_low``, ``platform_high`` (its side faces), ``platform_under``, and with a shroud
         ``shroud_low``, ``shroud_high`` (its contact faces). The sets ``…_low`` and ``…_high`` have the same order: the i-th
-        node of the high face is that of the low face turned about the axis, to rounding.
+        node of the high face is the i-th node of the low face turned about the axis, to rounding.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _wire(occ: Any, section: FloatArray) -> int:
 def _sizes(geometry: BladedSector) -> Callable[..., float]:
     """Return gmsh's callback for the element size at a point, a function of its radius.
 
-    It has no jumps: gmsh would call it a million times to find out where they are.
+    It has no jumps, since gmsh would call it a million times to locate them.
     """
     g = geometry
     rim = g.disk.rim_radius
@@ -187,7 +187,7 @@ def _face_pairs(gmsh: Any, geometry: BladedSector) -> list[_FacePair]:
 
 
 def _pair(gmsh: Any, name: str, angle: float, tilt: float, band: tuple[float, float]) -> _FacePair:
-    """Find the plane faces at plus and minus half the `angle`, tilted, whose centre's radius is in `band`."""
+    """Find the plane faces at plus and minus half the `angle`, tilted by `tilt`, with the radius of their centres in `band`."""
     found = []
     for sign in (-1, 1):
         normal = Axis().turned(np.array([[0.0, math.cos(tilt), -math.sin(tilt)]]), sign * angle / 2)
@@ -211,7 +211,7 @@ def _radius(gmsh: Any, face: int) -> float:
 
 
 def _lies_in(gmsh: Any, face: int, normal: FloatArray) -> bool:
-    """Return whether all corners of a face and its centre lie in the plane through the origin with this normal."""
+    """Whether all corners of a face and its centre lie in the plane through the origin with this normal."""
     corners = gmsh.model.getBoundary([(2, face)], recursive=True)
     at = [gmsh.model.getValue(0, tag, []) for _, tag in corners]
     at.append(gmsh.model.occ.getCenterOfMass(2, face))
@@ -224,7 +224,7 @@ def _rows(tags: IntArray, wanted: Any) -> IntArray:
 
 
 def _matched_nodes(gmsh: Any, pair: _FacePair, tags: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the nodes of both faces, paired, in the order of the low face's."""
+    """Return the nodes of both faces, paired, in the order of the low face."""
     master, high, low, _ = gmsh.model.mesh.getPeriodicNodes(2, pair.high, True)
     on_face, _, _ = gmsh.model.mesh.getNodes(2, pair.low, True, False)
     if master != pair.low or len(np.unique(low)) != len(np.unique(on_face)):
@@ -271,7 +271,7 @@ def _face_name(geometry: BladedSector, corners: FloatArray) -> str:
 
 
 def _check_shapes(points: FloatArray, cells: IntArray) -> None:
-    """Refuse tetrahedra that are turned inside out or as good as flat."""
+    """Refuse tetrahedra that are inside out or nearly flat."""
     corner = points[cells[:, :4]]
     edges = (corner[:, :, None] - corner[:, None]).reshape(len(cells), -1, 3)
     longest = np.linalg.norm(edges, axis=2).max(axis=1)

@@ -1,4 +1,4 @@
-"""Meshes of solids, facets of their skin, and files of them for ParaView and gmsh; meshio is imported only to write one."""
+"""Meshes of solids, facets of their skin, and mesh files for ParaView and gmsh; meshio is imported only to write a file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -108,7 +108,7 @@ HEX_EDGES = (*((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7)), 
 
 
 def facets_of(mesh: SolidMesh, nodes: IntArray) -> IntArray:
-    """Return the facets of the skin all of whose nodes belong to a set.
+    """Return the facets of the skin whose nodes all belong to a set.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _skin(mesh: SolidMesh) -> IntArray:
 
 
 def _pattern(mesh: SolidMesh) -> IntArray:
-    """Return which nodes of a cell each of its faces has, corners first."""
+    """Return the local node numbers of each face of a cell, corners first."""
     kind = mesh.cells.shape[1]
     corners, edges = (TET_FACES, TET_EDGES) if kind in (4, 10) else (HEX_FACES, HEX_EDGES)
     if kind in (4, 8):

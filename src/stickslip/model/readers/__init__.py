@@ -1,1 +1,1 @@
-"""Readers of the models and matrices that other programs write; none executes what it reads."""
+"""Readers of models and matrices from other programs; none executes any content of a file."""

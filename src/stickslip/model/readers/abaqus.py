@@ -15,7 +15,7 @@ from stickslip.model.readers.text import number_table, read_text, whole_numbers
 from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
-HELD = 1e36  # what Abaqus puts on the diagonal of a supported dof
+HELD = 1e36  # diagonal entry of a supported dof in Abaqus
 DIRECTIONS = 6
 
 
@@ -99,7 +99,7 @@ def read_coordinate_matrix(path: Path | str) -> Matrix:
 
 
 def _read_entries(path: Path) -> tuple[IntArray, FloatArray]:
-    """Return keys of row and column, (k, 2), and values; a key is ``6 node + direction``, direction from 0."""
+    """Return keys of row and column, (k, 2), and values; a key is ``6 node + direction``, directions counted from 0."""
     table = _table(path, 5)
     whole = whole_numbers(path, table, ("row node", "row dof", "column node", "column dof"))
     nodes, directions = whole[:, [0, 2]], whole[:, [1, 3]]
@@ -132,7 +132,7 @@ def _table(path: Path, columns: int) -> FloatArray:
 
 
 def _matrix(entries: tuple[IntArray, FloatArray], keys: IntArray, path: Path, *, supports: bool) -> Matrix:
-    """Return the matrix on the dofs `keys`; 1e36 is left out of the symmetry check, as it hides all else."""
+    """Return the matrix on the dofs `keys`; 1e36 is left out of the symmetry check, as it dwarfs all other entries."""
     index, values = np.searchsorted(keys, entries[0]), entries[1]
     held = np.zeros(len(values), dtype=bool)
     if supports:

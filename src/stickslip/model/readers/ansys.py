@@ -1,7 +1,7 @@
 """Matrices from ANSYS's binary file ``.full``.
 
-Read with NumPy alone, by `ansys_records`, which checks every record before it is followed: the compiled reader that
-others use ends the whole program on a file that was cut short.
+`ansys_records` reads them with NumPy and checks every record first. The compiled reader of other packages crashes the whole
+program on a truncated file.
 """
 
 from pathlib import Path
@@ -148,9 +148,9 @@ def _coordinates(file: Records, header: IntArray, n: int) -> tuple[IntArray, Int
 def _matrix(
     file: Records, header: IntArray, pointer: tuple[int, int], terms: tuple[int, int], name: str
 ) -> Matrix | None:
-    """Return one of the matrices, all of it, from its upper triangle; None where the file has none.
+    """Return one full matrix from its upper triangle; None if the file has none.
 
-    `pointer` and `terms` are the places in the header of the two halves of these numbers.
+    `pointer` and `terms` are positions in the header: each number is stored there as two halves.
     """
     n, at = int(header[1]), long_pointer(header[pointer[0]], header[pointer[1]])
     stored = long_pointer(header[terms[0]], header[terms[1]])
@@ -181,7 +181,7 @@ def _matrix(
 
 
 def _structure(matrices: list[Matrix], node: IntArray, component: IntArray, known: AnsysNodes, place: str) -> Structure:
-    """Put mass, damping, stiffness and nodes together, in the file's units and the global axes."""
+    """Assemble the structure from mass, damping, stiffness and nodes, in the file's units and the global axes."""
     position, sets = known.of_dofs(node, place)
     turned = known.numbers[known.angles.any(axis=1)]
     if np.isin(node, turned).any():

@@ -26,8 +26,8 @@ from stickslip.model.readers.ansys_blocks import (
 from stickslip.model.readers.units import Units, check_material
 
 COUPLED = ("coupled_1", "coupled_2")
-NODES_OF_SOLID = {185: (8, 4), 186: (20,), 187: (10, 4)}  # element type -> its regular numbers of nodes
-# values of KEYOPT other than 0 that leave these solids as they are read: SOLID186 with full integration, and output
+NODES_OF_SOLID = {185: (8, 4), 186: (20,), 187: (10, 4)}  # element type -> numbers of nodes of regular shapes
+# values of KEYOPT other than 0 that do not change how these solids are read: full integration of SOLID186, and output options
 HARMLESS_OPTIONS = {(186, 2): ("1",), (185, 5): ("1", "2"), (186, 5): ("1", "2"), (187, 5): ("1", "2")}
 WHAT_OPTIONS = {
     (185, 2): "another integration than full: reduced, or with enhanced strains",
@@ -37,7 +37,7 @@ WHAT_OPTIONS = {
     (186, 6): "a pressure of its own",
     (187, 6): "a pressure of its own",
 }
-# tables of what a material does beyond small vibration: plasticity, creep, and friction of contacts
+# material tables without effect on small vibration: plasticity, creep, and friction of contacts
 BEYOND_VIBRATION = {
     "PLAS",
     "BISO",
@@ -54,7 +54,7 @@ BEYOND_VIBRATION = {
     "FAIL",
     "FCLI",
 }
-WITHOUT_STIFFNESS = {154, 200}  # surface effect elements for pressures, and meshes that are not solved
+WITHOUT_STIFFNESS = {154, 200}  # surface effect elements for pressures, and mesh-only elements
 
 
 def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> SolidMesh:
@@ -76,8 +76,8 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     Raises
     ------
     InputError
-        If the file is damaged; if elements are degenerate, lack mid-side nodes, are of different shapes, or of types
-        with stiffness that are no solids.
+        If the file is damaged; if elements are degenerate, lack mid-side nodes, have different shapes, or have stiffness
+        but are no solids.
     """
     units = Units.si() if units is None else units
     path = Path(path)
@@ -148,7 +148,7 @@ def read_ansys_materials(
 
 
 def ansys_passed_over(path: Path | str) -> tuple[str, ...]:
-    """Return the commands of an archive that are ignored and that a study must define itself: supports, damping.
+    """Return the ignored commands of an archive whose content a study must define itself: supports, damping.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def ansys_speed(path: Path, units: Units) -> float:
 
 
 def _coupled(blocks: Blocks) -> IntArray:
-    """Return the (k, 2) numbers of nodes that are coupled in pairs (CP); others, and constraint equations, are refused."""
+    """Return the (k, 2) numbers of nodes coupled in pairs (CP); refuse other couplings and constraint equations."""
     pairs: dict[tuple[int, int], None] = {}
     for place, (command, *words) in blocks.commands:
         if command.upper() not in CONSTRAINTS:
@@ -225,7 +225,7 @@ def _coupled(blocks: Blocks) -> IntArray:
 
 
 def _check_options(blocks: Blocks) -> None:
-    """Refuse an option of a solid that elements have, by which its matrices are others."""
+    """Refuse element options (KEYOPT) that change the matrices of a solid in use."""
     used = set(blocks.heads[:, TYPE].tolist())
     for place, (command, *words) in blocks.commands:
         if command.upper() not in OPTIONS:
@@ -245,7 +245,7 @@ def _check_options(blocks: Blocks) -> None:
 
 
 def _solids(path: Path, blocks: Blocks) -> IntArray:
-    """Return the rows of the solid elements; refuse others that have a stiffness."""
+    """Return the rows of the solid elements; refuse other elements with stiffness."""
     kinds = np.array([blocks.types.get(int(t), 0) for t in blocks.heads[:, TYPE]], dtype=np.int64)
     others = sorted(set(kinds.tolist()) - NODES_OF_SOLID.keys() - WITHOUT_STIFFNESS)
     if others:
@@ -275,7 +275,7 @@ def _solids(path: Path, blocks: Blocks) -> IntArray:
 
 
 def _cells(path: Path, blocks: Blocks, kept: IntArray) -> IntArray:
-    """Return the (m, k) node numbers of the solids in VTK order, which is ANSYS's for regular shapes."""
+    """Return the (m, k) node numbers of the solids in VTK order, which equals ANSYS's order for regular shapes."""
     counts, often = np.unique([len(blocks.nodes[row]) for row in kept], return_counts=True)
     if len(counts) > 1:
         raise input_error(

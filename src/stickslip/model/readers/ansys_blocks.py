@@ -1,7 +1,7 @@
 """ANSYS archives (``.cdb`` of ``CDWRITE``): nodes, elements, components and material properties, from text.
 
-Only blocked data are read (``NBLOCK``, ``EBLOCK``, ``CMBLOCK``, ``ET``, ``MPDATA``); all other commands are passed over,
-none is carried out.
+Only blocked data are read (``NBLOCK``, ``EBLOCK``, ``CMBLOCK``, ``ET``, ``MPDATA``); all other commands are skipped, none is
+executed.
 """
 
 import re
@@ -17,15 +17,15 @@ from stickslip.model.readers.keywords import LARGEST
 from stickslip.model.readers.text import read_text
 
 HEAD = 11  # numbers before the nodes of an element: material, type, ..., number of nodes, -, element
-TYPE, COUNT, NUMBER = 1, 8, 10  # places among them
+TYPE, COUNT, NUMBER = 1, 8, 10  # their positions among these numbers
 CUT_SHORT = "The file was cut short: write or copy it again."
 WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDWRITE,DB,model,cdb."
 
 
 ROTATIONS = ("OMEGA", "CMOMEGA", "CGOMGA", "DOMEGA", "CMDOMEGA", "DCGOMG")
 CONSTRAINTS = ("CE", "CP")
-OPTIONS = ("KEYO", "KEYOP", "KEYOPT")  # of an element type; ANSYS takes four letters
-BEHAVIOUR = ("TB",)  # tables of a material, beside its elastic properties
+OPTIONS = ("KEYO", "KEYOP", "KEYOPT")  # options of an element type; ANSYS accepts the first four letters
+BEHAVIOUR = ("TB",)  # material tables in addition to elastic properties
 SUPPORTS = ("D",)
 DAMPING = ("ALPHAD", "BETAD", "DMPRAT", "DMPSTR")
 KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS, *BEHAVIOUR, *SUPPORTS, *DAMPING)
@@ -55,7 +55,7 @@ class Blocks:
         Material number -> property -> value.
     commands
         (place, words) of commands that change the model: rotation, coupled dofs, constraint equations, options of element
-        types (those of ``ET`` as separate ``KEYOPT``), tables of materials, supports, damping.
+        types (options in ``ET`` as separate ``KEYOPT``), tables of materials, supports, damping.
     """
 
     numbers: IntArray
@@ -126,7 +126,7 @@ def read_blocks(path: Path) -> Blocks:
 
 
 def integer(word: str) -> int:
-    """Return a whole number that consists of digits; `ValueError` if it does not, or is too large."""
+    """Return a whole number from a word of digits; `ValueError` for other words and too large numbers."""
     number = int(word)
     if not word.isascii() or abs(number) > LARGEST:
         raise ValueError(word)
@@ -134,7 +134,7 @@ def integer(word: str) -> int:
 
 
 def is_whole(word: str) -> bool:
-    """Whether `integer` reads a word as a number from zero on."""
+    """Whether `integer` reads a word as a number of at least zero."""
     return word.isascii() and word.isdecimal() and len(word) <= len(str(LARGEST)) and int(word) <= LARGEST
 
 
@@ -162,7 +162,7 @@ def _block_end(lines: list[str], at: int) -> int:
 
 
 def _fields(path: Path, lines: list[str], first: int, width: int, kind: Callable[[str], float]) -> list[list[float]]:
-    """Cut lines into fields of a width; blank ones are zeros."""
+    """Cut lines into fields of equal width; blank fields are zeros."""
     table = []
     for number, line in enumerate(lines, first + 1):
         row = [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
@@ -227,7 +227,7 @@ def _element_block(path: Path, lines: list[str], at: int, heads: list[list[int]]
 
 
 def _component(path: Path, lines: list[str], at: int, sets: dict[str, IntArray]) -> int:
-    """Add a node component: numbers, where a negative one ends a range; return the line after it."""
+    """Add a node component (numbers; a negative one ends a range); return the line after it."""
     words = [word.split("!")[0].strip() for word in lines[at].split(",")]
     if len(words) < 4:
         raise input_error(f"{path}: line {at + 1}", "is no head of a component", CUT_SHORT)
@@ -248,7 +248,7 @@ def _component(path: Path, lines: list[str], at: int, sets: dict[str, IntArray])
 
 
 def _ranges(path: Path, at: int, read: list[int], most: int) -> IntArray:
-    """Write out ranges: 3, -6 is 3, 4, 5, 6. No component has more nodes than the file has lines."""
+    """Expand ranges: 3, -6 is 3, 4, 5, 6. Refuse a range of more than `most` nodes."""
     members: list[IntArray] = []
     for i, number in enumerate(read):
         first = number if number > 0 else (read[i - 1] + 1 if i and read[i - 1] > 0 else 0)
@@ -259,7 +259,7 @@ def _ranges(path: Path, at: int, read: list[int], most: int) -> IntArray:
 
 
 def _property(path: Path, at: int, words: list[str], properties: dict[int, dict[str, float]]) -> None:
-    """Keep a material property; one that depends on temperature is refused."""
+    """Store a material property; refuse one that depends on temperature."""
     if words[0].upper() == "MP":  # MP,EX,1,2.1e11
         name, number, first, values = words[1:2], words[2:3], "1", words[3:4]
     else:  # MPDATA,R5.0, 1,EX  ,       1, 1, 7.000000000E+10,

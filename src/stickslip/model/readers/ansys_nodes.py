@@ -12,7 +12,7 @@ from stickslip.model.readers.ansys_blocks import read_blocks
 from stickslip.model.readers.ansys_records import Records, long_pointer, open_records
 
 RESULT = 12
-COMPONENTS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}  # by ANSYS's numbers
+COMPONENTS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}  # ANSYS's numbers of the components
 NODE_FIELDS = 7  # number, x, y, z, and three angles
 
 
@@ -57,7 +57,7 @@ class AnsysNodes:
 
 
 def no_nodes() -> AnsysNodes:
-    """Return an empty table, for files without a file of nodes."""
+    """Return an empty table, for matrices without a file of nodes."""
     return AnsysNodes(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)), {})
 
 

@@ -1,4 +1,4 @@
-"""Records of ANSYS's binary files: every pointer, length and window is checked before it is followed.
+"""Records of ANSYS's binary files; every pointer, length and window is checked before use.
 
 A file is a chain of records of 32-bit words: the number of words, a word of flags, the words, the number again. The
 flags say whether the words are integers or real numbers, in half or full precision, and which of two sparse forms they
@@ -13,10 +13,10 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 
-HEADER = 103  # word at which the header record of the file's own kind stands
-HEADER_WORDS = 1000  # more than any release writes there
+HEADER = 103  # first word of the header record that is specific to the kind of file
+HEADER_WORDS = 1000  # more words than any release writes there
 KINDS = {2: ".emat", 4: ".full", 8: ".sub", 9: ".mode", 10: ".rdsp", 11: ".tri", 12: ".rst"}
-# bits of the word of flags
+# bits of the flags word
 INTEGER, HALF, ZLIB, WINDOWS, BITS = 1 << 31, 1 << 30, 1 << 29, 1 << 28, 1 << 27
 CUT_SHORT = "Was the file copied whole, in binary mode? Write or copy it again."
 
@@ -37,14 +37,14 @@ class Records:
     words: IntArray
 
     def record(self, pointer: int, most: int, what: str) -> tuple[FloatArray, int]:
-        """Return the numbers of the record at word `pointer`, unpacked, and where the next record starts.
+        """Return the numbers of the record at word `pointer`, unpacked, and the word at which the next record starts.
 
         Parameters
         ----------
         pointer
             Word at which the record starts.
         most
-            Largest count of numbers, which bounds the allocated memory.
+            Largest allowed count of numbers; it limits the allocated memory.
         what
             Expected content, for messages.
 
@@ -113,7 +113,7 @@ class Records:
         return np.frombuffer(words.tobytes(), kind)
 
     def _from_bits(self, words: IntArray, kind: np.dtype, what: str) -> FloatArray:
-        """Unpack a record of up to 32 numbers, of which a bit each says whether it is stored."""
+        """Unpack a record of up to 32 numbers; one bit for each number says whether it is stored or zero."""
         size, bits = int(words[0]), int(words[1])
         stored = np.array([i for i in range(32) if bits >> i & 1])
         packed = words[2:].tobytes()

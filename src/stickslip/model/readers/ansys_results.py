@@ -15,7 +15,7 @@ from stickslip.model.structure import Dofs
 RESULT = 12
 MODAL = 2
 ANALYSES = {0: "static", 1: "buckling", 2: "modal", 3: "harmonic", 4: "transient", 7: "substructure"}
-UNDEFINED = 2.0**100  # what ANSYS writes where a node has no result
+UNDEFINED = 2.0**100  # ANSYS's value for a node without result
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,8 @@ class AnsysResults:
     harmonic_indices
         (k,) nodal diameters of a cyclic analysis, the second mode of a pair negative; all zero for other analyses.
     sectors
-        Sectors of a cyclic analysis, else 1. The shapes are then those of the modelled sector, real as
-        in the file: the two of a pair are the real and the imaginary part.
+        Number of sectors of a cyclic analysis, else 1. With sectors, the shapes belong to the modelled sector and are real as
+        in the file: the two modes of a pair are the real and the imaginary part of a travelling wave.
     """
 
     frequencies_hz: FloatArray
@@ -58,7 +58,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     Raises
     ------
     InputError
-        If the file is damaged, of another kind or analysis, one of several parts, or contains complex modes.
+        If the file is damaged, of another kind or analysis, only one of several files, or contains complex modes.
     """
     units = Units.si() if units is None else units
     file = open_records(path, RESULT)
@@ -80,7 +80,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     position, _ = known.of_dofs(node, str(path))
     shapes = _turned(shapes, components, rotations(known, numbers[order]))
     dofs = Dofs(node, tuple(COMPONENTS[c] for c in components) * len(numbers), units.length * position)
-    # φᵀMφ = 1 in the file's units and in SI: a rotation's part is per length
+    # φᵀMφ = 1 in the file's units and in SI; rotations have the unit of a displacement over a length
     scale = units.lengths(dofs) / (np.sqrt(units.mass) * units.length)
     cyclic = long_pointer(header[16], header[43])
     indices = (
@@ -98,7 +98,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
 
 
 def _modal(file: Records, header: IntArray) -> None:
-    """Refuse result files other than whole ones of a modal analysis."""
+    """Refuse result files that are incomplete or not of a modal analysis."""
     if header[7] != MODAL:
         raise input_error(
             str(file.path),
@@ -145,7 +145,7 @@ def _mode(file: Records, pointer: int, n_nodes: int, n_components: int) -> Float
         raise file.damaged("displacements of a mode", "holds numbers that are not finite")
     mode = np.zeros((n_nodes, width))
     rows: IntArray = np.arange(n_nodes)
-    if len(found) < n_nodes:  # only some nodes: their places follow
+    if len(found) < n_nodes:  # only some nodes: their indices follow
         rows = file.integers(after, n_nodes, "nodes of a mode") - 1
     if len(rows) != len(found) or rows.min(initial=0) < 0 or rows.max(initial=0) >= n_nodes:
         raise file.damaged("nodes of a mode", f"{len(rows)} nodes for {len(found)} displacements")
@@ -154,7 +154,7 @@ def _mode(file: Records, pointer: int, n_nodes: int, n_components: int) -> Float
 
 
 def _turned(shapes: FloatArray, components: list[int], turn: FloatArray) -> FloatArray:
-    """Return modes (k, nodes, components) out of the nodal systems (nodes, 3, 3)."""
+    """Rotate modes (k, nodes, components) from the nodal systems (nodes, 3, 3) to the global axes."""
     if (turn == np.eye(3)).all():
         return shapes
     turned = shapes.copy()
@@ -174,7 +174,7 @@ def _turned(shapes: FloatArray, components: list[int], turn: FloatArray) -> Floa
 def _harmonic_indices(file: Records, pointer: int, room: int, frequencies: FloatArray, sectors: int) -> IntArray:
     """Return the signed harmonic index of each mode.
 
-    Old releases write no signs: there the second of two equal frequencies is the negative one.
+    Old releases write no signs; then the second of two equal frequencies gets the negative index.
     """
     read = file.integers(pointer, max(room, len(frequencies)), "harmonic indices")
     indices = read[: len(frequencies)].copy()

@@ -15,7 +15,7 @@ from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, who
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
-MAX_NODE_DIGITS = 16  # digits of a node number: no program numbers further
+MAX_NODE_DIGITS = 16  # largest number of digits of a node number: no program numbers further
 SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
 
 
@@ -46,8 +46,8 @@ def read_calculix_matrices(
     Returns
     -------
     Structure
-        Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. The matrices of a cyclic job are complex
-        Hermitian: those of a travelling wave on the independent nodes of the cyclic tie.
+        Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. The matrices of a cyclic job are complex Hermitian:
+        they describe a travelling wave on the independent nodes of the cyclic tie.
 
     Raises
     ------
@@ -136,13 +136,13 @@ def _read_dof(path: Path) -> tuple[IntArray, list[str]]:
 
 
 def _check_end(path: Path, text: str) -> None:
-    """Refuse a file whose last line has no end: a number may be cut in two."""
+    """Refuse a file whose last line has no line end: its last number may be truncated."""
     if not text.endswith("\n"):
         raise input_error(str(path), "ends in the middle of a line", CUT_SHORT)
 
 
 def _read_matrix(path: Path, n: int) -> Matrix:
-    """Return the (n, n) matrix of lines ``row column value``, complex where the file holds twice the equations."""
+    """Return the (n, n) matrix of lines ``row column value``; it is complex if the file has twice as many equations."""
     text = read_text(path)
     _check_end(path, text)
     table = number_table(path, text, 3)

@@ -1,7 +1,7 @@
 """Input decks of CalculiX and Abaqus: the mesh, its material, supports, speed and cyclic symmetry.
 
-The parser is our own: meshio, which the mesher brings along, reads nodes, elements and sets of such a file and passes
-over materials, supports, ties and steps without a word, and it is not there when only NumPy and SciPy are installed.
+The parser is our own. meshio, which the mesher installs, reads nodes, elements and sets of such a file, but silently skips
+materials, supports, ties and steps; and with only NumPy and SciPy installed it is not available.
 """
 
 import math
@@ -110,8 +110,8 @@ def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
     return np.asarray(rows[:, [1 + i for i in (*corners, *middles)]].ravel(), dtype=np.int64)
 
 
-PAIRED = 1e-3  # of a face's size: how far a turned face may lie from the other
-ROUNDING = 1e-9  # squares of direction cosines below are zero
+PAIRED = 1e-3  # largest distance between a rotated cyclic face and the other face, over the size of the face
+ROUNDING = 1e-9  # squares of direction cosines below this value are zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +121,8 @@ class Deck:
     Parameters
     ----------
     mesh
-        Cells and their nodes. Node sets: those of the deck without clamped nodes; ``root``,
-        the clamped nodes; with cyclic symmetry ``cyclic_low`` and ``cyclic_high``: the first, rotated by one
-        pitch, coincides with the second.
+        Cells and their nodes. Node sets: the deck's sets without clamped nodes; ``root``, the clamped nodes; with cyclic
+        symmetry ``cyclic_low`` and ``cyclic_high``. The low face, rotated by one pitch, coincides with the high face.
     element_type
         Element type of the deck, e.g. ``C3D10``.
     materials
@@ -165,11 +164,11 @@ class Deck:
 
     @property
     def quadrature(self) -> Quadrature:
-        """The quadrature rules of CalculiX for the element type; exact rules for element types that differ by more than a rule."""
+        """CalculiX's quadrature rules for the element type; exact rules where the quadrature is not the only difference."""
         return QUADRATURES.get(self.element_type, Quadrature())
 
 
-# found by comparing with matrices that CalculiX 2.20 stored: equal to 2e-14
+# determined by comparison with matrices stored by CalculiX 2.20, which agree to 2e-14
 QUADRATURES = {
     "C3D4": Quadrature(stiffness=1, mass=1),
     "C3D10": Quadrature.calculix(),
@@ -303,7 +302,7 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
 
 
 def _found_instead(model: DeckModel, name: str) -> str:
-    """Return the probable cause of a missing keyword of a material: another material, or the keyword below it."""
+    """Return the probable cause of a missing material keyword, for the message."""
     known = sorted({*model.elastic, *model.density})
     if name not in known:
         return f"Add it. {did_you_mean(name, known)}" if known else "Add it."
@@ -311,7 +310,7 @@ def _found_instead(model: DeckModel, name: str) -> str:
 
 
 def _cell_materials(model: DeckModel) -> tuple[str, ...]:
-    """Return the material of each cell; the last section counts where two name it."""
+    """Return the material of each cell; if two sections contain a cell, the last one counts."""
     numbers = model.cells[:, 0]
     name = np.full(len(numbers), -1)
     for i, (_, elements, _) in enumerate(model.sections):
@@ -342,13 +341,13 @@ def _mesh(model: DeckModel, units: Units) -> tuple[SolidMesh, IntArray]:
 
 
 def _index(mesh: SolidMesh, numbers: IntArray) -> IntArray:
-    """Return the nodes with these numbers, in their order, as far as the mesh has them."""
+    """Return the nodes with these numbers, in this order; numbers that the mesh does not contain are skipped."""
     place = np.minimum(np.searchsorted(mesh.numbers, numbers), len(mesh.numbers) - 1)
     return np.asarray(place[mesh.numbers[place] == numbers], dtype=np.int64)
 
 
 def _held(model: DeckModel) -> BoolArray:
-    """Return which components of all nodes of the deck are supported, (n, 3)."""
+    """Return a mask (n, 3) of the supported components of all nodes of the deck."""
     held = np.zeros((len(model.nodes.numbers), 3), dtype=bool)
     for i, component in enumerate("xyz"):
         for nodes in model.fixed[component]:
@@ -357,7 +356,7 @@ def _held(model: DeckModel) -> BoolArray:
 
 
 def _axis(model: DeckModel, units: Units) -> Axis:
-    """Return the axis that all of the deck's axes lie on; the cyclic model's comes first."""
+    """Return the common axis of the deck, first choice the cyclic model's; refuse axes that differ."""
     if not model.axes:
         return Axis()
     axes = [
@@ -381,7 +380,7 @@ def _three(values: list[float]) -> tuple[float, float, float]:
 def _oriented(
     points: FloatArray, faces: tuple[IntArray, IntArray], axis: Axis, sectors: int
 ) -> tuple[IntArray, IntArray]:
-    """Return the faces such that the first, turned by one pitch, comes to lie on the second."""
+    """Order the faces so that the first, rotated by one pitch, coincides with the second."""
     from scipy.spatial import cKDTree
 
     pitch = 2 * math.pi / sectors
@@ -395,10 +394,10 @@ def _oriented(
 def _held_by_tie(
     mesh: SolidMesh, held: BoolArray, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float
 ) -> BoolArray:
-    """Return the supports with those that the cyclic tie carries over to the other face.
+    """Return the supports, with supports of one cyclic face transferred to the other by the tie.
 
-    CalculiX takes no support on the dependent face: its nodes are held because their partners are. With
-    ``u_high = R u_low`` a component of one is held if all components of the other are that it is made of.
+    CalculiX accepts no support on the dependent face, whose nodes are held by their partners. With ``u_high = R u_low``, a
+    component on one face is held if all components of the other face in its row are held.
     """
     from scipy.spatial import cKDTree
 
@@ -406,7 +405,7 @@ def _held_by_tie(
     distance, partner = cKDTree(mesh.points[high]).query(axis.turned(mesh.points[low], pitch))
     near = distance <= PAIRED * float(np.ptp(mesh.points[high], axis=0).max())
     first, second = low[near], high[partner[near]]
-    share = axis.rotation(pitch) ** 2  # of each component of the low face in one of the high face
+    share = axis.rotation(pitch) ** 2  # weight of each component of the low face in each one of the high face
     held = held.copy()
     held[first] |= (~held[second]) @ share < ROUNDING
     held[second] |= (~held[first]) @ share.T < ROUNDING

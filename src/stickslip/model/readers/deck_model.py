@@ -80,7 +80,7 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
             elif word in _ACTIONS:
                 _ACTIONS[word](model, block)
         elif word in TOLD:
-            if any(block.rows()):  # none where a step takes earlier loads away
+            if any(block.rows()):  # a step that only removes earlier loads has no rows
                 model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
         elif word not in SILENT:
             raise _refused(block)
@@ -88,7 +88,7 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
 
 
 def passed_over(ignore: tuple[str, ...]) -> set[str]:
-    """Return the keywords that a user asks to ignore, in the spelling of blocks."""
+    """Return the keywords that the user ignores, in the spelling of blocks."""
     return {" ".join(word.upper().strip("* ").split()) for word in ignore}
 
 
@@ -103,7 +103,7 @@ def unread(block: Block, problem: str) -> InputError:
 
 
 def _refused(block: Block) -> InputError:
-    """Return why a keyword cannot be ignored."""
+    """Return the error that explains why a keyword is not ignored."""
     word = block.keyword
     if word in DAMPING:
         return input_error(
@@ -125,7 +125,7 @@ def _refused(block: Block) -> InputError:
 
 
 def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
-    """Take elements, all with the same count of nodes, and the element sets."""
+    """Read elements, all with the same count of nodes, and the element sets."""
     parts, named = [], dict[str, list[IntArray]]()
     for block in blocks:
         if block.keyword != "ELEMENT":
@@ -168,7 +168,7 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
 
 
 def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
-    """Add the node sets that ``*NSET, NSET=…, ELSET=…`` takes from elements."""
+    """Add the node sets that ``*NSET, NSET=…, ELSET=…`` defines by elements."""
     sets = dict(model.nodes.node_sets)
     for block in blocks:
         if block.keyword == "NSET" and "ELSET" in block.parameters:
@@ -183,7 +183,7 @@ def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
 
 
 def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
-    """Yield number and nodes of each element; a long one goes over several lines."""
+    """Yield number and nodes of each element; long elements continue on the next lines."""
     row: list[int] = []
     place = block.place
     for place, fields in block.rows():
@@ -243,7 +243,7 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
 
 
 def _boundary(model: DeckModel, block: Block) -> None:
-    """Take supports: ``node or set, first direction, last direction, value`` or ``ENCASTRE`` and the like."""
+    """Read supports: ``node or set, first direction, last direction, value``, or a type such as ``ENCASTRE``."""
     words = {"ENCASTRE": (1, 6), "PINNED": (1, 3)}
     if block.parameters.get("TYPE", "DISPLACEMENT").upper() != "DISPLACEMENT":
         raise unread(block, f"TYPE={block.parameters['TYPE']} is not read")
@@ -269,18 +269,18 @@ def _boundary(model: DeckModel, block: Block) -> None:
 
 
 def _anew(block: Block) -> bool:
-    """Whether what earlier steps said is gone (``OP=NEW``)."""
+    """Whether the block replaces earlier ones of its kind (``OP=NEW``)."""
     operation = block.parameters.get("OP", "MOD").upper()
     if operation not in ("NEW", "MOD"):
         raise input_error(block.place, f"OP={operation} is not known", "Write OP=NEW or OP=MOD.")
     return operation == "NEW"
 
 
-ROTATIONS = ("CENT", "CORIO", "ROTA", "ROTDYNF")  # of Abaqus
+ROTATIONS = ("CENT", "CORIO", "ROTA", "ROTDYNF")  # Abaqus' loads by rotation, which are refused
 
 
 def _distributed_load(model: DeckModel, block: Block) -> None:
-    """Take rotation: ``elements, CENTRIF, speed², point of the axis, direction``; list other loads as ignored."""
+    """Read rotation: ``elements, CENTRIF, speed², point of the axis, direction``; list other loads as ignored."""
     if _anew(block):
         model.speed_squares = []
     for place, fields in block.rows():
@@ -316,7 +316,7 @@ def _whole_model(model: DeckModel, name: str, place: str, what: str) -> None:
 
 
 def _initial(model: DeckModel, block: Block) -> None:
-    """List initial conditions that leave the matrices as they are as ignored; refuse stresses and what else is given."""
+    """List initial conditions without effect on the matrices as ignored; refuse stresses and all others."""
     kind = block.parameter("TYPE").upper()
     if kind not in PASSING_CONDITIONS:
         raise unread(block, f"initial conditions of TYPE={kind} change the stiffness")
@@ -324,7 +324,7 @@ def _initial(model: DeckModel, block: Block) -> None:
 
 
 def _step(model: DeckModel, block: Block) -> None:
-    """List a nonlinear step as ignored: its stiffness is that of another state."""
+    """List NLGEOM of a step as ignored: statics is linear here."""
     if block.parameters.get("NLGEOM", "NO").strip().upper() != "NO":
         model.ignored.append(f"NLGEOM of *STEP ({block.path.name}: line {block.line}): statics is linear here")
 

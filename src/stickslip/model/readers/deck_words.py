@@ -3,8 +3,8 @@
 Any other keyword or parameter is refused by line: it may change mass, stiffness, supports, damping or rotation.
 """
 
-# Parameters of the keywords that are read. Those in the second row are harmless: names, outputs, tolerances of a tie that is
-# made anew here, amplitudes of a support of zero, thicknesses of shells, options of rate-dependent materials.
+# Parameters of the keywords that are read. The second row has harmless parameters: names, outputs, tolerances of a tie that is
+# made anew here, amplitudes of a zero displacement, thicknesses of shells, options of rate-dependent materials.
 PARAMETERS: dict[str, frozenset[str]] = {
     keyword: frozenset([*read, *harmless])
     for keyword, read, harmless in (
@@ -32,8 +32,8 @@ PARAMETERS: dict[str, frozenset[str]] = {
     )
 }
 
-# Keywords that are not read, but say nothing about mass, stiffness, supports or damping: names, procedures, output, the
-# properties of contacts and shells (what uses them is refused)
+# Keywords that are skipped, as they do not affect mass, stiffness, supports or damping: names, procedures, output, and
+# properties of contacts and shells (contacts and shells themselves are refused)
 SILENT = frozenset(
     {
         "HEADING",
@@ -114,8 +114,8 @@ SILENT = frozenset(
     }
 )
 
-# Keywords that are passed over and told by line: loads of the deck's own analyses, which a study states anew, and what
-# materials do beyond small vibration
+# Keywords that are skipped and reported by line: loads of the deck's own analyses, which a study defines itself, and material
+# behaviour beyond small vibration
 TOLD = frozenset(
     {
         "CLOAD",
@@ -140,10 +140,10 @@ TOLD = frozenset(
     }
 )
 
-# Initial conditions that leave mass and stiffness as they are
+# Initial conditions without effect on mass and stiffness
 PASSING_CONDITIONS = frozenset({"TEMPERATURE", "DISPLACEMENT", "VELOCITY", "FIELD", "ROTATING VELOCITY"})
 
-# Damping, which a study states in a table of its own
+# Damping, which a study defines in its own table
 DAMPING = frozenset({"DAMPING", "MODAL DAMPING", "GLOBAL DAMPING", "DAMPING CONTROLS"})
 # Keywords that are known to change the matrices
 REFUSED = frozenset(
@@ -201,7 +201,7 @@ REFUSED = frozenset(
         "INITIAL STRAIN INCREASE",
     }
 )
-# Bricks whose matrices are no plain ones: what they have, and what to do instead
+# Bricks with other matrices than a plain solid: their difference, and the remedy
 OTHER_BRICKS = {
     "C3D8I": ("incompatible modes", "Mesh with C3D20R, C3D20 or C3D10."),
     "C3D8R": (

@@ -23,7 +23,7 @@ def check_range(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
 
 def check_unique(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
     """Refuse entries that are given twice."""
-    key = np.sort(np.asarray(rows, dtype=np.int64) * n + columns)  # files hold 32-bit indices
+    key = np.sort(np.asarray(rows, dtype=np.int64) * n + columns)  # 32-bit indices of files would overflow
     twice = np.flatnonzero(np.diff(key) == 0)
     if twice.size:
         row, column = divmod(int(key[twice[0]]), n)

@@ -14,14 +14,14 @@ from stickslip.model.readers.node_table import NodeTable, node_table
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
 from stickslip.model.readers.units import SI, Units
 
-# element type -> nodes, and where VTK's nodes stand (the format lists a brick's upright edges before its top ones)
+# element type -> position of each of VTK's nodes in the file, which lists a brick's vertical edges before its top ones
 HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
 CELLS: dict[int, tuple[int, ...]] = {1: tuple(range(8)), 3: tuple(range(4)), 4: HEX20, 6: tuple(range(10))}
-WIDTHS = {0: 5, 1: 10}  # of a node number in the short and the long format
+WIDTHS = {0: 5, 1: 10}  # characters of a node number in the short and the long format
 VALUE = 12  # characters of a value
-PER_LINE = 6  # values of a line
+PER_LINE = 6  # values on a line
 MODAL = 2  # kind of a result: 0 static, 1 time step, 2 frequency, 3 load step
-RESPONSE = "RESPONSE"  # the text of a block at a frequency that is no mode shape but a motion
+RESPONSE = "RESPONSE"  # text of a block with a forced response instead of a mode shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class FrdResults:
     fields: tuple[NodalField, ...]
 
     def field(self, name: str, step: int | None = None) -> NodalField:
-        """Return the first field `name`, or that of `step`; an `InputError` lists the available ones."""
+        """Return the first field `name`, or the field `name` of `step`; an `InputError` lists the available ones."""
         for candidate in self.fields:
             if candidate.name == name and step in (None, candidate.step):
                 return candidate
@@ -146,7 +146,7 @@ class _Frd:
         self.tables: list[tuple[IntArray, FloatArray]] = []
         self.cells: dict[int, list[list[int]]] = {}
         self.fields: list[tuple[NodalField, bool]] = []
-        self.diameter: int | None = None  # of the fields that follow
+        self.diameter: int | None = None  # nodal diameter of the fields that follow
 
     def read(self) -> None:
         while self.at < len(self.lines):
@@ -203,7 +203,7 @@ class _Frd:
         return block
 
     def _rows(self, header: str, columns: int, layout: int) -> tuple[IntArray, FloatArray]:
-        """Return node numbers and `columns` values each of a block of fixed columns."""
+        """Read a block of fixed columns; return node numbers and `columns` values for each."""
         count = self._whole(header[24:36])
         first, width = self.at, WIDTHS[layout]
         block = self._block()
@@ -227,7 +227,7 @@ class _Frd:
         return found
 
     def _spoiled(self, block: Sequence[str], first: int, width: int) -> InputError:
-        """Find the line with something else than a number."""
+        """Return the error that names the line with something else than a number."""
         for i, line in enumerate(block):
             rest = line[3 + width :].rstrip()
             fields = [line[3 : 3 + width].strip() or "0"]
@@ -243,7 +243,7 @@ class _Frd:
         return self._wrong("a block is no table of numbers")
 
     def _read_cells(self, width: int) -> None:
-        """Take the element block: a line with number and kind, then lines of nodes."""
+        """Read the element block: a line with number and type, then lines of nodes."""
         first = self.at
         block = self._block()
         after = self.at

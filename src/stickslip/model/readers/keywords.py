@@ -14,7 +14,7 @@ from stickslip.model.readers.text import SHOWN, number_table, read_text
 
 MAX_INCLUDES = 200
 DEEPEST_INCLUDE = 10
-LARGEST = 2**53  # no program numbers further
+LARGEST = 2**53  # largest number of a node or element
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Block:
         return value
 
     def check_parameters(self) -> None:
-        """Refuse an unknown parameter of a keyword that is read."""
+        """Refuse an unknown parameter of the keyword."""
         known = PARAMETERS[self.keyword]
         for name in self.parameters:
             if name not in known:
@@ -78,7 +78,7 @@ class Block:
                     yield f"{segment.path}: line {number}", fields
 
     def table(self, columns: int) -> FloatArray:
-        """Return data lines that all have the same count of numbers, (rows, columns)."""
+        """Return the data lines as numbers (rows, columns), all with the same count."""
         tables = [
             number_table(s.path, _without_last_commas(s.text), columns, separator=",", first_line=s.first_line)
             for s in self.segments
@@ -92,7 +92,7 @@ def keyword_blocks(path: Path) -> list[Block]:
     Parameters
     ----------
     path
-        The file; ``*INCLUDE``, and ``INPUT=`` of a keyword that is read, may name files in its folder and in folders below.
+        The file; ``*INCLUDE``, and ``INPUT=`` of a supported keyword, may name files in its folder and its subfolders.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def real_number(text: str, place: str, what: str) -> float:
 
 
 def members(blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, IntArray]) -> dict[str, IntArray]:
-    """Return the sets of nodes or elements that the blocks define, in the order they list them.
+    """Return the sets of nodes or elements that the blocks define, in the order of the file.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _parse_keyword(line: str, path: Path, number: int) -> Block:
 
 
 def _included(block: Block, path: Path, stack: list[Path], count: list[int]) -> Path:
-    """Return the file an ``*INCLUDE`` names, if it may be read."""
+    """Return the file named by an ``*INCLUDE``; refuse files outside the deck's folder and circular inclusion."""
     root = Path(realpath((stack or [path])[0])).parent
     name = block.parameter("INPUT")
     target = Path(realpath(root / name))

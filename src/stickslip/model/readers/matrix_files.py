@@ -1,6 +1,6 @@
 """Matrices in neutral files: Matrix Market, SciPy's ``.npz``, HDF5; with a CSV file of their dofs.
 
-The reader of Matrix Market is our own: SciPy's ends the whole program on some damaged files.
+The reader of Matrix Market is our own: SciPy's reader crashes the whole program on some damaged files.
 """
 
 import zipfile
@@ -20,8 +20,8 @@ from stickslip.model.readers.text import CUT_SHORT, SHOWN, number_table, read_te
 from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Dofs, Structure, numbered_dofs
 
-MAX_ROWS_PER_ENTRY = 10  # rows an entry above which a size is not believed
-FIELDS = {"real": 1, "integer": 1, "double": 1, "complex": 2}  # numbers of a value
+MAX_ROWS_PER_ENTRY = 10  # rows per entry above which the stated size is implausible
+FIELDS = {"real": 1, "integer": 1, "double": 1, "complex": 2}  # numbers in a line for one value
 SYMMETRIES = ("general", "symmetric", "hermitian", "skew-symmetric")
 
 
@@ -33,7 +33,7 @@ def read_matrix_market(path: Path, n: int | None) -> Matrix:
     path
         The file, plain or gzipped.
     n
-        Expected size, checked before memory is allocated; None: the size in the file, if there are enough entries for it.
+        Expected size, checked before memory is allocated; None: the size in the file, if its number of entries is plausible.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def read_matrix_market(path: Path, n: int | None) -> Matrix:
             "Its first line begins with %%MatrixMarket matrix, for example %%MatrixMarket matrix coordinate real symmetric; "
             "matrices of Abaqus are read by read_abaqus_matrices.",
         )
-    # comments become empty lines, so that line numbers stay
+    # comments become empty lines, so that line numbers are kept
     lines = ["" if line.startswith("%") else line for line in rest.split("\n")]
     at = next((i for i, line in enumerate(lines) if line.strip()), 0)
     sparse, width = words[2] == "coordinate", FIELDS[words[3]]
@@ -87,7 +87,7 @@ def _counts(path: Path, line: str, number: int, count: int) -> list[int]:
 
 
 def _own_size(path: Path, counts: list[int]) -> int:
-    """Return the size that a file says, which its entries must fill as those of a stiffness do."""
+    """Return the size stated in the file; refuse a size with implausibly few entries for a stiffness matrix."""
     n, columns = counts[:2]
     stored = counts[2] if len(counts) > 2 else n * columns
     if n != columns or not 0 < n <= MAX_ROWS_PER_ENTRY * stored:
@@ -121,11 +121,11 @@ def _coordinate(path: Path, table: FloatArray, values: FloatArray, n: int, symme
 
 
 def _array(values: FloatArray, n: int, symmetry: str) -> Matrix:
-    """Return the dense matrix of values column by column."""
+    """Return the dense matrix from values listed column by column."""
     if symmetry == "general":
         return values.reshape(n, n).T
     matrix = np.zeros((n, n), dtype=values.dtype)
-    # the lower triangle column by column is the upper one of the transpose, row by row
+    # the lower triangle column by column is the upper triangle of the transpose row by row
     rows, columns = np.triu_indices(n, 1 if symmetry == "skew-symmetric" else 0)
     matrix[columns, rows] = values
     other = _mirrored(matrix, symmetry)
@@ -164,7 +164,7 @@ def read_matrix_files(
         Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or dense arrays in ``.npz``, or HDF5 (``.h5``), where
         the matrix is the group or dataset ``stiffness``, ``mass`` or ``damping``.
     nodes
-        CSV file, one line a dof in the order of the equations, with the columns ``node, component, x, y, z``; components
+        CSV file, one line for each dof in the order of the equations, with the columns ``node, component, x, y, z``; components
         are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks. None: the dofs are called
         ``dof1``, ``dof2`` and so on, have no position, and count as translations.
     units
@@ -207,14 +207,14 @@ def read_matrix_files(
 
 
 def names_in(path: Path) -> tuple[str, ...]:
-    """Return the names of the matrices in a file (stiffness, mass, damping); an empty result means one matrix without a name."""
+    """Return the names of the matrices in a file (stiffness, mass, damping); empty if it has one matrix without a name."""
     suffix = path.suffix.lower()
     found: Collection[str] = ()
     if suffix == ".npz":
         found = _names_in_npz(path)
     elif suffix in HDF5:
         found = _names_in_hdf5(path)
-    if "format" in found:  # a structure, or one sparse matrix
+    if "format" in found:  # a file of `save_structure`, or one sparse matrix
         return ()
     return tuple(name for name in ("stiffness", "mass", "damping") if name in found)
 
@@ -234,7 +234,7 @@ def _names_in_npz(path: Path) -> Collection[str]:
     try:
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}
-    except (OSError, ValueError, RuntimeError, zipfile.BadZipFile):  # told when it is read
+    except (OSError, ValueError, RuntimeError, zipfile.BadZipFile):  # the reader reports it
         return ()
 
 
@@ -244,7 +244,7 @@ def _names_in_hdf5(path: Path) -> Collection[str]:
     try:
         with h5py.File(path, "r") as file:
             return set(file)
-    except (OSError, RuntimeError):  # told when its matrices are read
+    except (OSError, RuntimeError):  # the reader reports it
         return ("mass",)
 
 
@@ -343,7 +343,7 @@ def _read_hdf5(path: Path, name: str) -> Arrays:
 
 
 def _dataset(dataset: Matrix, path: Path) -> Matrix:
-    """Read one dataset of HDF5 into memory if it lies in the file and can be as large as it says."""
+    """Read one HDF5 dataset into memory; refuse external data and implausible sizes."""
     place = f"{path}: {dataset.name}"
     if dataset.external or dataset.is_virtual or dataset.dtype.kind not in "fciuSO":
         raise input_error(place, "lies in another file or is no array of numbers", "Copy it plainly.")

@@ -15,7 +15,7 @@ from stickslip.model.readers.text import SHOWN, read_text
 MAX_ROWS = 2_000_000
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 FORCES = {"n": 1.0, "kn": 1e3}
-REPEATED_VALUE_RTOL = 1e-9  # relative difference of two values that are one
+REPEATED_VALUE_RTOL = 1e-9  # relative difference below which two values are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class MeasuredColumns:
 
 
 def read_columns(path: Path) -> MeasuredColumns:
-    """Read a CSV file with a line of names; lines that are empty or begin with ``#`` are passed over.
+    """Read a CSV file with a line of names; empty lines and lines that begin with ``#`` are skipped.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def read_columns(path: Path) -> MeasuredColumns:
         If the file cannot be read, names a column twice, or a line has another number of cells.
     """
     table: list[tuple[int, list[str]]] = []
-    reader = csv.reader(read_text(path).splitlines())  # whatever ends the lines
+    reader = csv.reader(read_text(path).splitlines())  # accepts all line ends
     try:
         for row in reader:
             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
@@ -166,7 +166,7 @@ def _check(path: Path, names: tuple[str, ...], table: list[tuple[int, list[str]]
             )
 
 
-LOOP = "loop"  # column that tells recordings apart
+LOOP = "loop"  # column that identifies the recording
 
 
 def read_loops(path: str | Path) -> tuple[tuple[FloatArray, FloatArray], ...]:

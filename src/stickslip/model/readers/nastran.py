@@ -66,8 +66,8 @@ def read_nastran_op4(
     path
         The file, as ``OUTPUT4`` writes it.
     mass, stiffness, damping
-        Names of the matrices, e.g. ``"maa"`` and ``"kaa"``; where several have the same name, ``"maa[0]"`` is the first
-        and ``"maa[-1]"`` the last.
+        Names of the matrices, e.g. ``"maa"`` and ``"kaa"``; if several have the same name, ``"maa[0]"`` is the first and
+        ``"maa[-1]"`` the last.
     geometry
         Source of degrees of freedom and positions: the ``.op2`` file, the bulk data or the ``.asm`` file (``EXTSEOUT``) of the
         same model.
@@ -112,7 +112,7 @@ def read_nastran_op4(
             f"holds {len(dependent)} degrees of freedom that depend on others (MPC, RBE), without the equations",
             "Write the matrices of the f-set or the a-set.",
         )
-    free = np.flatnonzero(~np.isin(rows, known.sets.get("s", [])))  # others are held (SPC)
+    free = np.flatnonzero(~np.isin(rows, known.sets.get("s", [])))  # the s-set is constrained (SPC)
     whole = [real_symmetric(found[name], f"{path}: {name}") for name in names]
     matrices = [matrix[free][:, free] for matrix in whole]
     structure = assembled(matrices, known, rows[free])
@@ -187,7 +187,7 @@ def op4_matrices(path: Path, names: list[str], check: Callable[[str, tuple[int, 
                 raise input_error(str(path), f"holds no matrix {word!r}", did_you_mean(word, sorted(set(there))))
             places[name] = _pick(path, name, len(same)) % len(same)
             check(name, tuple(shapes[same[places[name]]]))
-        # sparse, whatever the header says: memory then follows from what is stored
+        # sparse, whatever the header says: memory then depends on the stored entries only
         read = op4.load(str(path), namelist=list(plain.values()), into="list", sparse=True)
         return {
             name: scipy.sparse.csr_array(
@@ -214,7 +214,7 @@ def _pick(path: Path, name: str, count: int) -> int:
 
 
 def real_symmetric(matrix: Matrix, place: str) -> Matrix:
-    """Return a real symmetric (n, n) CSR matrix with the symmetric part of `matrix`; refuse unsymmetric ones.
+    """Return the symmetric part of a real matrix, (n, n) CSR; refuse an unsymmetric matrix.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def real_symmetric(matrix: Matrix, place: str) -> Matrix:
         raise input_error(place, "holds numbers that are not finite", CUT_SHORT)
     matrix = scipy.sparse.csr_array(matrix, dtype=float)
     skew, largest = abs(matrix - matrix.T).max(), abs(matrix).max()
-    if skew > 1e-6 * largest:  # what single precision and few digits leave
+    if skew > 1e-6 * largest:  # smaller differences come from single precision and few digits
         raise input_error(
             place,
             f"is not symmetric: entries differ by {skew:.3g} from those across the diagonal",
@@ -284,7 +284,7 @@ def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> Nastran
 
 
 def _with_modes(path: Path, frequencies: FloatArray, table: Any, units: Units) -> NastranResults:
-    """Bring pyYeti's table of modes, rows (grid, component), together with the geometry of the same file."""
+    """Combine pyYeti's table of modes, rows (grid, component), with the geometry in the same file."""
     known = read_nastran_dofs(path)
     with reading(path):
         wanted = 10 * np.asarray(table.index.get_level_values(0), dtype=np.int64)
@@ -303,7 +303,7 @@ def _with_modes(path: Path, frequencies: FloatArray, table: Any, units: Units) -
             "Write one solution of one structure to a file.",
         )
     turn, dofs = known.rotation(rows), known.table(rows)
-    # φᵀMφ = 1 in the file's units and in SI: a rotation's part is per length
+    # φᵀMφ = 1 in the file's units and in SI; rotations have the unit of a displacement over a length
     scale = units.lengths(dofs) / (np.sqrt(units.mass) * units.length)
     shapes = shapes if turn is None else turn @ shapes
     position = units.length * dofs.position

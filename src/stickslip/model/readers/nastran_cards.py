@@ -1,4 +1,4 @@
-"""Cards of Nastran's bulk data: small, large and free fields, with the lines they stand on; nothing is passed over in silence."""
+"""Cards of Nastran's bulk data, in small, large and free fields, with their line numbers; nothing is skipped silently."""
 
 import re
 from collections.abc import Collection, Iterator
@@ -10,8 +10,8 @@ from stickslip.model.readers.text import SHOWN, read_text
 
 SHORTENED = re.compile(r"(?<=[\d.])([+-]\d+)$")  # 1.5-3 is 1.5e-3
 CUT_SHORT = "The file was cut short, or its cards are not in order."
-FIELDS = {True: (16, 4), False: (8, 8)}  # large or small: width of a field, fields a line
-NAMED = 72  # column behind which the name of the continuation stands in fixed fields
+FIELDS = {True: (16, 4), False: (8, 8)}  # large or small: width of a field, fields per line
+NAMED = 72  # column after which fixed fields have the name of the continuation
 NAME = re.compile(r"[A-Z][A-Z0-9]*")
 
 
@@ -24,7 +24,7 @@ class Card:
     name
         Name in upper case, without the star of large fields.
     fields
-        Data fields, filled up to lines of eight; none if the card's fields are not read.
+        Data fields, padded to a multiple of eight; empty if the card's fields are not read.
     place
         File and line, for messages.
     """
@@ -73,7 +73,7 @@ def bulk_cards(path: Path, read: Collection[str]) -> Iterator[Card]:
 
 
 def _filled(fields: list[str]) -> tuple[str, ...]:
-    """Return fields filled up to lines of eight, as a card of small fields has them: one line of large fields has four."""
+    """Pad fields to a multiple of eight, the number on a line of small fields; a line of large fields has four."""
     return (*fields, *[""] * (-len(fields) % 8))
 
 
@@ -106,7 +106,7 @@ def _first_word(text: str) -> str:
 
 
 def _name(first: str, place: str) -> str:
-    """Return the name of a card, whose first field has it."""
+    """Return the name of a card from its first field."""
     if first.startswith("="):
         raise input_error(place, "repeats cards (=), which is not read", "Write each card.")
     name = first.removesuffix("*").strip()
@@ -116,7 +116,7 @@ def _name(first: str, place: str) -> str:
 
 
 def _continues(name: str, awaited: str, place: str) -> None:
-    """Refuse a continuation that belongs to another card: both have names, and these differ."""
+    """Refuse a continuation of another card, whose name differs from the expected one."""
     name, awaited = name.lstrip("+*"), awaited.lstrip("+*")
     if name and awaited and name != awaited:
         raise input_error(

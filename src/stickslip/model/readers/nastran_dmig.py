@@ -1,4 +1,4 @@
-"""Matrices from ``DMIG`` cards of Nastran's bulk data and punch files; read here, so that no package is needed."""
+"""Matrices from ``DMIG`` cards of Nastran's bulk data and punch files; no other package is needed."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +16,7 @@ from stickslip.model.readers.units import Units, check_units, in_si
 from stickslip.model.structure import Structure
 
 SQUARE, SYMMETRIC = 1, 6
-# cards that say where grids lie, to which sets they belong, and tables: all but these change what the matrices are
+# cards without effect on the matrices: positions of grids, sets and tables; all others change the model
 BESIDE = {
     "ASET",
     "ASET1",
@@ -50,7 +50,7 @@ BESIDE = {
     "USET",
     "USET1",
 }
-PRINTS = {"EXTOUT", "GRDPNT", "POST", "PRTMAXIM"}  # parameters that choose what is printed
+PRINTS = {"EXTOUT", "GRDPNT", "POST", "PRTMAXIM"}  # parameters that affect only the output
 
 
 @dataclass(eq=False)
@@ -60,11 +60,11 @@ class Cards:
     Parameters
     ----------
     form
-        1 square, 6 symmetric; others are rectangular.
+        1 for square, 6 for symmetric; other numbers are rectangular.
     refused
         Reason why the matrix cannot be read; empty if it can.
     rows, columns
-        Coordinates, ten times the grid plus the component.
+        Coordinates as ten times the grid plus the component.
     values
         Entries of the matrix.
     """
@@ -143,7 +143,7 @@ def read_nastran_dmig(
 
 
 def _dofs(keys: IntArray, geometry: Path | str | None, place: str) -> NastranDofs:
-    """Return the coordinates `keys`, with positions and axes where the geometry is given."""
+    """Return the coordinates `keys`, with positions and axes if the geometry is given."""
     ids, components = keys // 10, keys % 10
     points = np.full((len(keys), 3), np.nan)
     sets = {"g": np.arange(len(keys))}
@@ -183,7 +183,7 @@ def _matrix(cards: Cards, keys: IntArray, place: str) -> Matrix:
 
 
 def _cards(path: Path) -> dict[str, Cards]:
-    """Return all DMIG matrices of a file, those that cannot be read with the reason and without entries."""
+    """Return all DMIG matrices of a file by name; an unreadable matrix has the reason and no entries."""
     found: dict[str, Cards] = {}
     for card in bulk_cards(path, {"DMIG", "PARAM"}):
         if card.name != "DMIG":
@@ -197,7 +197,7 @@ def _cards(path: Path) -> dict[str, Cards]:
             continue
         if name not in found:
             raise input_error(card.place, f"DMIG {name} has a column before its head (DMIG {name} 0 ...)", CUT_SHORT)
-        if not found[name].refused:  # the others are refused only where they are asked for
+        if not found[name].refused:  # an unreadable matrix is an error only if it is requested
             _add_column(found[name], card)
     return found
 
@@ -210,7 +210,7 @@ def _head(card: Card) -> Cards:
 
 
 def _add_column(cards: Cards, card: Card) -> None:
-    """Add the entries of one column: fields of the column, then four for each entry."""
+    """Add the entries of one column: the column's own fields come first, then four for each entry."""
     column = _key(card.fields[1], card.fields[2], card.place)
     groups = [card.fields[i : i + 4] for i in range(4, len(card.fields), 4)]
     if card.fields[3] or any(any(group) for group in groups if not group[0]):
@@ -222,7 +222,7 @@ def _add_column(cards: Cards, card: Card) -> None:
 
 
 def _refuse_what_is_missed(card: Card) -> None:
-    """Refuse a card that adds to the model, holds it or scales it: nothing but matrices is read here."""
+    """Refuse a card that adds to the model, constrains it or scales it: only matrices are read here."""
     if card.name == "PARAM" and card.fields[0].upper() in PRINTS:
         return
     if card.name not in BESIDE:

@@ -18,7 +18,7 @@ from stickslip.model.readers.nastran_library import check_records, existing_file
 from stickslip.model.readers.node_table import rotation_to_global
 from stickslip.model.structure import Dofs
 
-COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # 0 is a scalar point
+COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # component 0 is a scalar point
 SYSTEMS = {"CORD2R", "CORD2C", "CORD2S"}
 MISSED = {
     **dict.fromkeys(("CORD1R", "CORD1C", "CORD1S", "CORD3G", "CORD3R"), "where a coordinate system lies"),
@@ -64,7 +64,7 @@ class NastranDofs:
     turns
         (k, 3, 3) axes of these grids, as columns.
     sets
-        Name of a set of Nastran, such as ``a`` -> its degrees of freedom; only ``g`` if the file has no sets.
+        Name of a Nastran set, such as ``a`` -> its degrees of freedom; only ``g`` if the file has no sets.
     place
         The file, for messages.
     constraint
@@ -127,7 +127,7 @@ def read_nastran_dofs(path: Path | str) -> NastranDofs:
 
 
 def _table_of_op2(path: Path) -> tuple[Any, dict[str, IntArray]]:
-    """Return pyYeti's table of the g-set of the residual structure, and the sets that the file tells of."""
+    """Return pyYeti's table of the g-set of the residual structure, and the sets in the file."""
     with nastran_library("op2").OP2(str(path)) as file:
         names = {str(name) for name in file.dbnames}
         if names & {"SUPERID", "EMAP", "EMAPS", "SLIST"}:  # the alter NAS2CAM wrote it
@@ -142,12 +142,15 @@ def _table_of_op2(path: Path) -> tuple[Any, dict[str, IntArray]]:
 
 
 def _table_of_bulk(path: Path) -> tuple[Any, dict[str, IntArray], str]:
-    """Return pyYeti's table of all grids, sets, and the first constraint; an external superelement (``.asm``) has its a-set in its own order."""
+    """Return pyYeti's table of all grids, the sets, and the first constraint.
+
+    The a-set of an external superelement (``.asm``) has its own order.
+    """
     text, constraint = _geometry(path)
     bulk = nastran_library("bulk")
     if path.suffix.lower() != ".asm":
         return bulk.bulk2uset(StringIO(text), follow_includes=False)[0], {}, constraint
-    # which components the grids keep stands in the .pch file beside it
+    # the components of the grids are in the .pch file beside it
     _geometry(existing_file(path.with_suffix(".pch")))
     table, _, _, kept = bulk.asm2uset(str(path), try_rdextrn="pv_only", follow_includes=False)
     return table, {"a": np.flatnonzero(kept)}, ""
@@ -157,7 +160,7 @@ def _geometry(path: Path) -> tuple[str, str]:
     """Return the grids and coordinate systems of bulk data as plain cards, and the first constraint among all cards."""
     lines, constraint = [], ""
     seen: dict[str, set[int]] = {"grid": set(), "coordinate system": {0}}
-    named: dict[int, str] = {}  # systems, with the card that names them first
+    named: dict[int, str] = {}  # coordinate system -> place of the card that names it first
     for card in bulk_cards(path, {"GRID", *SYSTEMS}):
         if card.name in MISSED:
             raise input_error(
@@ -187,7 +190,7 @@ def _geometry(path: Path) -> tuple[str, str]:
 
 
 def _once(word: str, what: str, seen: dict[str, set[int]], card: Card) -> int:
-    """Return the number of a grid or a system, which no card before has."""
+    """Return the number of a grid or a system; refuse a number that an earlier card has."""
     number = whole(word, card.place)
     if number in seen[what]:
         raise input_error(card.place, f"{what} {number} is there twice", "Give each once.")
@@ -212,7 +215,7 @@ def _dofs(table: Any, sets: dict[str, IntArray], place: str) -> NastranDofs:
     values = np.asarray(table[["x", "y", "z"]], dtype=float)
     points = np.full((len(ids), 3), np.nan)
     first = np.flatnonzero(components == 1)
-    for offset in range(6):  # six rows a grid: position, system, origin, axes
+    for offset in range(6):  # six rows for each grid: position, system, origin, axes
         points[first + offset] = values[first]
     turns = np.array([_axes(values[row : row + 6], int(ids[row]), place) for row in first])
     own = (np.abs(turns.reshape(-1, 3, 3) - np.eye(3)) > 1e-14).any(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""pyYeti, which knows Nastran's binary files: called only after the chain of records has been checked, and never blindly."""
+"""Calls of pyYeti, which reads Nastran's binary files; the chain of records is checked first, and its errors are converted."""
 
 import importlib
 import re
@@ -14,7 +14,7 @@ import numpy as np
 from stickslip.errors import StickslipError, did_you_mean, input_error, missing_package
 
 CUT_SHORT = "Was the file copied whole, in binary mode? Write or copy it again."
-FIRST_MARKS = {4, 8, 24, 48}  # bytes of the first record: of a key in op2, of a header in op4
+FIRST_MARKS = {4, 8, 24, 48}  # length in bytes of the first record: a key in op2, a header in op4
 
 
 def nastran_library(module: str) -> ModuleType:
@@ -53,7 +53,7 @@ def is_binary(path: Path) -> bool:
 def check_records(path: Path) -> None:
     """Check the chain of records of a binary file from end to end: each record is enclosed by two equal lengths.
 
-    The library trusts these lengths, so it is called after this check only.
+    The library trusts these lengths, so this check comes first.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def check_records(path: Path) -> None:
 def check_lines(path: Path) -> None:
     """Check the columns of a text OP4 file from end to end: each has as many lines as its head states.
 
-    The library would read endlessly if a damaged count is large, so it is called after this check only.
+    With a large damaged count the library would read endlessly, so this check comes first.
 
     Raises
     ------
@@ -101,10 +101,10 @@ def check_lines(path: Path) -> None:
 
 
 def _skip_matrix(lines: Iterator[str], head: str) -> None:
-    """Pass over the columns of one matrix of text."""
+    """Skip the columns of one text matrix."""
     width = 16 if head.rstrip().endswith("|I16") else 8
     columns, rows, kind = int(head[:width]), int(head[width : 2 * width]), 2 * width + 8
-    words = 1 if int(head[kind : kind + 8]) % 2 else 2  # a number
+    words = 1 if int(head[kind : kind + 8]) % 2 else 2  # words of a number
     form = re.search(r"([1-9]\d*)[ED]\d+\.\d+", head[kind + 16 :].upper())
     a_line = int(form[1]) if form else 5
     big = rows < 0 or rows >= 65536
@@ -116,7 +116,7 @@ def _skip_matrix(lines: Iterator[str], head: str) -> None:
             return
         if column < 1 or stored < 0:
             raise ValueError(line)
-        if row > 0:  # dense
+        if row > 0:  # dense column
             _skip(lines, -(-stored // a_line))
             continue
         while stored > 0:
@@ -146,5 +146,5 @@ def reading(path: Path) -> Iterator[None]:
             yield
     except StickslipError:
         raise
-    except Exception as error:  # pandas under the library raises errors of its own
+    except Exception as error:  # pandas, which the library uses, raises errors of its own
         raise input_error(str(path), f"cannot be read ({type(error).__name__}: {error})", CUT_SHORT) from error

@@ -1,4 +1,4 @@
-"""Node numbers, positions, sets and nodal coordinate systems, which files of matrices lack."""
+"""Node numbers, positions, sets and nodal coordinate systems, for matrix files, which lack them."""
 
 import csv
 import io
@@ -63,7 +63,7 @@ class NodeTable:
     def dof_sets(self, dofs: Dofs) -> dict[str, IntArray]:
         """Return, for each node set, its dofs: node by node in the set's order, components in the table's order.
 
-        Nodes without dofs (clamped ones) are skipped; sets of such nodes only are left out.
+        Nodes without dofs (clamped nodes) are skipped; sets with such nodes only are left out.
         """
         order = np.argsort(dofs.node, kind="stable")
         nodes = dofs.node[order]

@@ -1,4 +1,4 @@
-"""Open a model file with the right reader, and report its content."""
+"""Choice of the reader for a model file, and summary of its content."""
 
 import re
 from collections import Counter
@@ -52,20 +52,20 @@ def read_model(
     nodes: Path | str | None = None,
     plausible: bool = True,
 ) -> Model:
-    """Read a model or results, by the suffix of the file.
+    """Read a model or results; the suffix of the file selects the reader.
 
     Parameters
     ----------
     path
         A deck (``.inp``), results (``.frd``, ``.rst``, ``.op2``), a mesh (``.cdb``), a structure of `save_structure`
-        (``.npz``) or matrices; of matrices in several files the stiffness.
+        (``.npz``) or matrices; if these are in several files, the stiffness.
     units
         Unit system of the file; a structure of `save_structure` is in SI.
     mesh, nodes
         Source of node positions, for matrices without them: see the reader of each format.
     mass, damping
-        Further files, for matrices in several files. With CalculiX the mass of another job; with Abaqus by default the file with
-        ``MASS`` for ``STIF`` in its name.
+        Further files, for matrices in several files. With CalculiX, the mass of another job; with Abaqus, the default is the file
+        with ``MASS`` in place of ``STIF`` in its name.
     plausible
         False accepts implausible mass, size and materials.
 
@@ -91,12 +91,12 @@ def read_model(
             use="Use",
         )
     if not path.is_file():
-        read_text(path)  # its message names the file that may be meant
+        read_text(path)  # its error suggests a similar file name
     return _READERS[suffix](files)
 
 
 def read_structure(place: str, path: Path, **settings: Any) -> Structure:
-    """Read matrices, by the suffix of their file; arguments beside `place`, the key that an error names, as in `read_model`.
+    """Read matrices; `place` is the key for messages, all other arguments are as in `read_model`.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def read_structure(place: str, path: Path, **settings: Any) -> Structure:
 
 
 def refuse_other_models(place: str, reader: str, found: object) -> None:
-    """Refuse what a reader of the user returns if it is neither a structure nor a mesh."""
+    """Refuse the result of a user's reader if it is neither a structure nor a mesh."""
     if not isinstance(found, Structure | SolidMesh):
         raise input_error(
             place,
@@ -152,7 +152,7 @@ def model_summary(model: Model, *, n_modes: int = 10, units: Units = SI, say: Sa
 
 
 def _frd_summary(results: FrdResults) -> ModelSummary:
-    """Count steps by field; the two parts of a mode at a wave number are one frequency."""
+    """Summarise results; the real and imaginary part of a travelling mode count as one frequency."""
     modes = {f.step: f for f in results.fields if f.frequency_hz is not None}
     steps = Counter(f.name for f in results.fields)
     remarks = [f"field {name} at {count} steps" for name, count in steps.items()]
@@ -204,7 +204,7 @@ def _npz(files: _Files) -> Structure:
 
 
 def _mtx(files: _Files) -> Structure:
-    """Distinguish Matrix Market from the text of Abaqus, which has the same suffix."""
+    """Read an ``.mtx`` file, which is Matrix Market or Abaqus' text format."""
     if read_text(files.path).startswith("%%MatrixMarket"):
         return _neutral(files)
     partner = re.sub("STIF", "MASS", files.path.name)
@@ -220,7 +220,7 @@ def _mtx(files: _Files) -> Structure:
 
 
 def _neutral(files: _Files) -> Structure:
-    here = names_in(files.path)  # one file may hold all matrices
+    here = names_in(files.path)  # one file may contain all matrices
     mass = files.mass or (files.path if "mass" in here else None)
     damping = files.damping or (files.path if "damping" in here else None)
     if mass is None:

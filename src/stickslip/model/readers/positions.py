@@ -1,4 +1,4 @@
-"""Positions and node sets from any file or mesh."""
+"""Positions and node sets from any file or mesh, and a check of positions against the stiffness."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +13,10 @@ from stickslip.model.readers.node_table import NodeTable, csv_nodes, deck_nodes,
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 
-BALANCED_ROW = 1e-4  # of the sum of a row's entries: rows that a rigid translation does not load
-ROTATION_STRAIN = 5e-3  # of the terms of a rotation; stresses of preload turn with it and leave some 1e-4
-MAX_ROWS = 5000  # rows that are looked at
-MIN_FREE_DOFS = 12  # dofs away from supports, from which positions are judged
+BALANCED_ROW = 1e-4  # force of a rigid translation on a row over the sum of its entries: less means no support
+ROTATION_STRAIN = 5e-3  # force of a rigid rotation over the sum of its terms; preload stresses alone cause about 1e-4
+MAX_ROWS = 5000  # largest number of rows examined
+MIN_FREE_DOFS = 12  # smallest number of dofs away from supports for a judgement
 READERS = {".inp": deck_nodes, ".frd": frd_nodes, ".csv": csv_nodes}
 
 
@@ -50,10 +50,10 @@ def find_nodes(source: SolidMesh | Path | str, units: Units) -> NodeTable:
 
 
 def doubt_about_positions(structure: Structure) -> str | None:
-    """Return why the positions probably belong to another mesh; None if they fit the stiffness.
+    """Return a sentence if the positions probably belong to another mesh; None if they fit the stiffness.
 
-    A rigid rotation causes no strain. Therefore stiffness times rotation vanishes away from supports and cyclic faces, but not with the positions of
-    other nodes. Supports and faces are found by the forces of rigid translations.
+    A rigid rotation causes no strain. Stiffness times rotation therefore vanishes away from supports and cyclic faces, unless
+    the positions belong to other nodes. Supports and faces are found by the forces of rigid translations.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def doubt_about_positions(structure: Structure) -> str | None:
         return None
     rows = rows[:: len(rows) // MAX_ROWS + 1]
     part = scipy.sparse.coo_array(stiffness[rows])
-    # about each row's own node, so that only the places of its neighbours count
+    # rotation about each row's own node, so that only positions relative to its neighbours count
     turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=2)  # node, component, axis
     away = np.einsum("mc,mca->ma", part @ translations, turns[rows])
     force = np.linalg.norm(part @ turns[np.arange(structure.n), component] - away)

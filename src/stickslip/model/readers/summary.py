@@ -1,4 +1,4 @@
-"""Summary of a model: counts, mass, size, first frequencies, plausibility; refusal of matrices that no passive structure has."""
+"""Summary of a model: counts, mass, size, first frequencies, plausibility. Matrices that are not passive are refused."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from stickslip.model.readers.positions import doubt_about_positions
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, doubt_about_units, translational_mass
 from stickslip.model.structure import Structure
 
-ROUNDED = 1e-3  # of the largest eigenvalue: files of few digits make small ones negative
+ROUNDED = 1e-3  # negative eigenvalue over the largest one: less is rounding in files with few digits
 
 
 def refuse_indefinite(structure: Structure, place: str) -> None:
@@ -26,7 +26,7 @@ def refuse_indefinite(structure: Structure, place: str) -> None:
     Raises
     ------
     InputError
-        If one is; the message names the matrix and the dof.
+        If a matrix is indefinite; the message names the matrix and the dof.
     """
     if structure.n and abs(structure.mass).max() > 0:
         refuse_bad_mass(structure, place)
@@ -54,7 +54,10 @@ def negative_damping(structure: Structure, name: str) -> tuple[str, ...]:
 
 
 def _most_negative(matrix: Matrix) -> tuple[int, float] | None:
-    """Return the dof that moves the most where a Hermitian matrix is negative, and how much it is; of large ones by the diagonal."""
+    """Return the dof with the largest motion in the most negative eigenvector of a Hermitian matrix, and the eigenvalue.
+
+    For large matrices they follow from the diagonal.
+    """
     if not matrix.shape[0]:
         return None
     diagonal = matrix.diagonal().real
@@ -100,7 +103,7 @@ class ModelSummary:
     rigid_modes
         Number of modes without strain among the computed ones.
     frequencies_hz
-        The first natural frequencies, or those the file stores.
+        First natural frequencies, or all frequencies stored in the file.
     remarks
         Sentences on doubtful, missing and ignored content.
     """
@@ -204,7 +207,7 @@ def _rank_of_mass(structure: Structure) -> tuple[int, list[str]]:
         return heavy, said
     try:
         rank = mass_rank(structure.mass)
-    except InputError:  # a negative mass: what looks for the modes says so
+    except InputError:  # a negative mass, which the computation of modes reports
         return heavy, said
     if rank < heavy:
         said.append(
@@ -226,7 +229,7 @@ def mesh_summary(mesh: SolidMesh, kind: str = "mesh") -> ModelSummary:
 
 
 def _centre(structure: Structure) -> FloatArray | None:
-    """Return the centre of the mass that moves along the first direction that has any."""
+    """Return the centre of mass for the first direction in which the structure has mass."""
     components = np.array(structure.dofs.component)
     for axis in ("x", "y", "z"):
         unit = (components == axis).astype(float)
@@ -242,7 +245,7 @@ def _with_modes(summary: ModelSummary, structure: Structure, n_modes: int, say: 
         return summary
     try:
         modes = normal_modes(structure, n_modes, say=say)
-    except StickslipError as error:  # a summary tells what it can
+    except StickslipError as error:  # the summary is given without frequencies
         return replace(summary, remarks=(*summary.remarks, f"No frequencies: {error}"))
     remarks = summary.remarks
     if modes.rigid:

@@ -11,14 +11,14 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.npz import require_no_pipe
 
-TEXT_RATIO = 200  # text of numbers packs to a fifth; a file that grows more is no such text
-PIECE = 2**24  # characters that are parsed at a time
-SHOWN = 60  # characters of a line in a message
+TEXT_RATIO = 200  # largest ratio of unpacked to packed size; numbers as text reach about 5
+PIECE = 2**24  # characters parsed at a time
+SHOWN = 60  # largest number of characters of a line in a message
 CUT_SHORT = "The file was cut short: write or copy it again."
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file; a name that ends in ``.gz`` is unpacked, to a bounded size.
+    """Return the text of a file; a ``.gz`` file is unpacked, up to a plausible size.
 
     Raises
     ------
@@ -55,11 +55,11 @@ def _decoded(path: Path, content: bytes) -> str:
             f"is no text: byte {zero + 1} is zero, as in pictures, archives and binary results",
             "Give the file that the program wrote as text (ASCII or UTF-8).",
         )
-    return content.decode("utf-8-sig", errors="replace")  # some editors mark it
+    return content.decode("utf-8-sig", errors="replace")  # some editors write a byte-order mark
 
 
 def _neighbours(path: Path) -> str:
-    """Return the file beside `path` that was probably meant."""
+    """Return a hint for messages: the file beside `path` that was probably meant."""
     try:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:
@@ -94,11 +94,11 @@ def number_table(
     Raises
     ------
     InputError
-        If a line contains anything else; the message quotes it.
+        If a line contains anything but numbers; the message quotes it.
     """
     tables = [np.empty((0, columns))]
     start = 0
-    while start < len(text):  # in pieces, because a stream of text takes four times its memory
+    while start < len(text):  # in pieces, because a text stream needs four times the memory
         end = text.find("\n", start + PIECE) + 1 or len(text)
         piece, start = text[start:end], end
         if not piece.strip():
@@ -114,7 +114,7 @@ def number_table(
 
 
 def _blame(path: Path, text: str, columns: int, separator: str | None, first_line: int) -> Exception:
-    """Find the line that spoiled the table."""
+    """Return the error that names the first bad line."""
     for number, line in enumerate(text.splitlines(), first_line):
         fields = line.split(separator)
         if not line.strip():

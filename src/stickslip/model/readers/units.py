@@ -1,4 +1,4 @@
-"""Unit systems of finite-element models, converted to SI here and nowhere else."""
+"""Unit systems of finite-element models; all conversions to SI are here."""
 
 from dataclasses import dataclass, replace
 
@@ -13,12 +13,12 @@ from stickslip.units import check_quantities, quantity
 INCH = 0.0254  # m, exact
 POUND = 0.45359237  # kg, exact
 GRAVITY = 9.80665  # m/s², exact: a pound-force is a pound under it
-DENSITIES = (5.0, 30_000.0)  # kg/m³: a hollow part in its bounding box, solid osmium
-USUAL = 100.0  # kg/m³: most parts in their bounding box have more
+DENSITIES = (5.0, 30_000.0)  # kg/m³ of the bounding box: from a hollow part to solid osmium
+USUAL = 100.0  # kg/m³ of the bounding box that most parts exceed
 SOLIDS = (500.0, 25_000.0)  # kg/m³: from light plastics to heavy metals
 MODULI = (1e7, 2e12)  # Pa: from rubber-like to diamond
 SIZES = (1e-4, 50.0)  # m
-ARGUMENTS = {"units": "units=Units.…()", "plausible": "plausible=False"}  # of all readers
+ARGUMENTS = {"units": "units=Units.…()", "plausible": "plausible=False"}  # arguments of all readers, for messages
 WRONG_UNITS = "Correct $units, or give $plausible where the numbers are right."
 
 
@@ -107,7 +107,7 @@ class Units:
     def lengths(self, dofs: Dofs) -> FloatArray:
         """Return the unit of each dof: a length in m, or 1 for dofs that are no lengths (rotations, modes).
 
-        Dofs of matrices without a table count as translations: as pure numbers their stiffness would be an energy.
+        Dofs of matrices without a table count as translations: with dimensionless dofs the stiffness would be an energy.
         """
         along = [c in ("x", "y", "z") or is_numbered(c) for c in dofs.component]
         return np.where(along, self.length, 1.0)
@@ -143,7 +143,7 @@ def in_si(structure: Structure, units: Units) -> Structure:
         return scipy.sparse.csr_array(factor * (diagonal @ matrix @ diagonal))
 
     if (units.length, units.mass, units.time) == (1.0, 1.0, 1.0):
-        return structure  # to the last bit
+        return structure  # exactly unchanged
     return replace(
         structure,
         mass=scaled(structure.mass, energy),
@@ -165,10 +165,10 @@ def translational_mass(structure: Structure) -> FloatArray:
 
 
 def doubt_about_units(structure: Structure, units: Units) -> str | None:
-    """Return why the unit system is probably wrong; None if mass and size are plausible.
+    """Return a sentence if the unit system is probably wrong; None if mass and size are plausible.
 
-    The mass over the volume of the bounding box is at most the density of the material. No part is denser than
-    osmium, and few fill less than a thousandth of their box.
+    Mass over volume of the bounding box is at most the density of the material. No part is denser than osmium, and few
+    parts fill less than a thousandth of their box.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from stickslip.units import check_quantities, quantity
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 Triple = tuple[float, float, float]
 ALONG_XYZ: tuple[Triple, Triple, Triple] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-SKEW = 1e-12  # of the largest moment: a product of inertia below is rounding
+SKEW = 1e-12  # product of inertia over the largest moment: less is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ class RigidBody:
         return Structure(mass, np.zeros((6, 6)), np.zeros((6, 6)), dofs)
 
     def at_speed(self, speed: float, axis: Axis, *, coriolis: bool = False) -> Structure:
-        r"""Return the structure of the body in rotating axes: with spin softening, and with `coriolis` the gyroscopic matrix.
+        r"""Return the structure of the body in rotating axes, with spin softening and, if `coriolis`, the gyroscopic matrix.
 
         With the tensor J and the angular velocity Ω, the potential of the centrifugal forces is
         ``-(m |Ω x r|² + Ω·J(θ)Ω) / 2``; its second derivatives are the stiffness. The gyroscopic matrix is ``2 m Ω̂`` for
@@ -114,7 +114,7 @@ class RigidBody:
         return np.concatenate([force, -np.cross(spin, self.tensor @ spin)])
 
     def displacement_operator(self, points: FloatArray) -> FloatArray:
-        """Return the (p, 3, 6) operator to the displacement ``u_G + θ × r`` of material points.
+        """Return the (p, 3, 6) operator that gives the displacement ``u_G + θ × r`` of material points.
 
         Parameters
         ----------

@@ -35,7 +35,7 @@ from stickslip.model.rigid.sides import (
 from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
-RISE = 0.001 * math.sqrt(3) / (1 + math.sqrt(3))  # m: planes of 45° and 60° from edges 1 mm apart meet that much higher
+RISE = 0.001 * math.sqrt(3) / (1 + math.sqrt(3))  # m: height above edges 1 mm apart where planes of 45° and 60° meet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,12 +58,12 @@ class FlatCurvedDamper:
     sections
         Axial positions y in metres of the sections, increasing; each section has one point of each line.
     length
-        Extent in metres along y over which the sides touch, half of it on either side of y = 0.
+        Length in metres along y over which the sides touch, centred at y = 0.
     flat_between
         Distances in metres from the apex between which the flat side touches.
     curved_width
-        Width in metres of the strip in which the curved side touches. `length`, `flat_between` and `curved_width` give each point its area, for laws per area;
-        None: unknown.
+        Width in metres of the strip in which the curved side touches. The area of each point, for laws per area, follows from
+        `length`, `flat_between` and `curved_width`; None: unknown.
     mass
         Mass in kg.
     inertia
@@ -133,7 +133,7 @@ class FlatCurvedDamper:
         self.body()  # checks mass, inertia and centre
 
     def _check_extents(self) -> None:
-        """Refuse points beyond the contact stretches."""
+        """Refuse points outside the contact areas."""
         if self.length is not None and not grow_within(self.sections, -self.length / 2, self.length / 2):
             raise input_error(
                 "FlatCurvedDamper.length",
@@ -184,7 +184,7 @@ class FlatCurvedDamper:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Least and largest y of the prism in metres; without a length every section stands in the middle of its share."""
+        """Least and largest y of the prism in metres; without a length, from the spacing of the sections."""
         if self.length is not None:
             return -self.length / 2, self.length / 2
         first, last = self.sections[0], self.sections[-1]
@@ -213,7 +213,7 @@ class FlatCurvedDamper:
 def gap_operator(
     points: ContactPoints, blade_dofs: IntArray, damper_dofs: IntArray, n: int, body: RigidBody
 ) -> FloatArray:
-    """Return the (3 p, n) operator to the gaps ``frameᵀ (u_blade − u_damper)``.
+    """Return the (3 p, n) operator that gives the gaps ``frameᵀ (u_blade − u_damper)``.
 
     Rows t, w, n of each point in turn; a positive normal gap is open.
 
@@ -228,7 +228,7 @@ def gap_operator(
     n
         Number of dofs of the whole structure.
     body
-        The damper's rigid body, which moves its points.
+        The damper's rigid body.
     """
     motion = body.displacement_operator(points.position)
     operator = np.zeros((len(points), 3, n))

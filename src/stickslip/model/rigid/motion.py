@@ -1,4 +1,4 @@
-"""Rigid motions of bodies, and the bodies that nothing holds."""
+"""Rigid motions of bodies, and detection of unconstrained bodies."""
 
 import numpy as np
 import scipy
@@ -7,10 +7,10 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError
 from stickslip.model.structure import Dofs
 
-ROUNDING = 1e-12  # of the coordinates, below which points lie at one place
-RIGID_ENERGY = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
+ROUNDING = 1e-12  # extent of a body over its coordinates: with less, all points coincide
+RIGID_ENERGY = 1e-9  # strain energy of a rigid motion over the energy of single dofs: with less, the motion is free
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
-SHOWN_NODES = 5  # node numbers in a message
+SHOWN_NODES = 5  # largest number of node numbers in a message
 NAMES = tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz")
 
 
@@ -44,7 +44,7 @@ def refuse_unheld(stiffness: Matrix, dofs: Dofs, place: str) -> None:
 
 
 def _bodies(stiffness: Matrix) -> list[IntArray]:
-    """Return the index sets that the stiffness joins, largest first."""
+    """Return the index sets of bodies that the stiffness does not couple, largest first."""
     graph = abs(scipy.sparse.csr_array(stiffness))
     _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     order = np.argsort(label, kind="stable")
@@ -53,7 +53,7 @@ def _bodies(stiffness: Matrix) -> list[IntArray]:
 
 
 def _name(dofs: Dofs) -> str:
-    """Return ``1200 dofs of nodes 3, 4, 5, …`` or the label of the first dof of a body of no mesh."""
+    """Return ``1200 dofs of nodes 3, 4, 5, …``, or for a body without mesh the label of its first dof."""
     nodes = np.unique(dofs.node[dofs.node >= 0])
     if not nodes.size:
         return f"the body of dof {dofs.labels[0]} ({len(dofs)} dofs)"
@@ -63,14 +63,14 @@ def _name(dofs: Dofs) -> str:
 
 
 def loose_motions(stiffness: Matrix, dofs: Dofs) -> list[tuple[IntArray, FloatArray]]:
-    """Return the bodies that can move without strain: their dofs, and their free motions (m, f), each with largest entry one.
+    """Return the bodies that can move without strain: their dofs, and their free motions (m, f) with largest entry one.
 
     Parameters
     ----------
     stiffness
         (n, n), real symmetric, dense or sparse.
     dofs
-        Table of the n dofs. If some are no displacements or rotations of nodes, only small bodies are checked.
+        Table of the n dofs. Bodies with other dofs than displacements and rotations of nodes are checked only if small.
     """
     found = []
     for part in _bodies(stiffness):
@@ -81,11 +81,11 @@ def loose_motions(stiffness: Matrix, dofs: Dofs) -> list[tuple[IntArray, FloatAr
 
 
 def in_words(dofs: Dofs, shapes: FloatArray) -> str:
-    """Return rigid motions (n, f) of dofs in words: ``translation along x, rotation about z``."""
+    """Describe rigid motions (n, f) of dofs: ``translation along x, rotation about z``."""
     motions, centre, size = _six_motions(dofs)
     basis = np.linalg.qr(shapes)[0]
     six, *_ = np.linalg.lstsq(motions, basis, rcond=1e-9)
-    if np.linalg.norm(motions @ six - basis) > 1e-6:  # of dofs that have no place
+    if np.linalg.norm(motions @ six - basis) > 1e-6:  # dofs without position take part
         most = [dofs.labels[int(np.argmax(np.abs(shape)))] for shape in shapes.T]
         return f"moving without strain, {', '.join(dict.fromkeys(most))} the most"
     return _motion_names(six, motions, basis) or _screw(six, centre, size)
@@ -98,7 +98,7 @@ def _own(stiffness: Matrix, part: IntArray) -> Matrix:
 
 
 def _free(stiffness: Matrix, dofs: Dofs, part: IntArray) -> str:
-    """Return the motions of a body that cost no energy, in words; empty where it is held."""
+    """Describe the motions of a body without strain energy; empty if there are none."""
     own, table = _own(stiffness, part), dofs.take(part)
     if not np.any(own.diagonal()):
         return "it has no stiffness"
@@ -107,7 +107,7 @@ def _free(stiffness: Matrix, dofs: Dofs, part: IntArray) -> str:
 
 
 def _free_shapes(stiffness: Matrix, dofs: Dofs, judged: int = 1000) -> Matrix:
-    """Return the (n, f) motions of a body that cost no energy; `judged`: size up to which dofs without a place are looked at."""
+    """Return the (n, f) motions of a body without strain energy; bodies without positions only up to `judged` dofs."""
     motions, _, _ = _six_motions(dofs)
     left, values, _ = np.linalg.svd(motions, full_matrices=False)
     base = left[:, values > 1e-9 * max(values[0], 1e-300)]
@@ -120,7 +120,7 @@ def _free_shapes(stiffness: Matrix, dofs: Dofs, judged: int = 1000) -> Matrix:
 
 
 def _motion_names(six: Matrix, motions: FloatArray, null: Matrix) -> str:
-    """Name the motions along and about the axes that span the free ones; empty if they do not."""
+    """Name the motions along and about the axes that span the free motions; empty if they do not span them."""
     norms = np.linalg.norm(motions, axis=0)
     inside = np.linalg.norm(null.conj().T @ motions, axis=0) > (1 - 1e-9) * norms
     chosen = inside & (norms > 1e-9 * norms.max())
@@ -142,19 +142,19 @@ def _screw(six: Matrix, centre: FloatArray, size: float) -> str:
 
 
 def _triple(vector: FloatArray) -> str:
-    rounded = np.round(vector, 9) + 0.0  # no minus before a zero
+    rounded = np.round(vector, 9) + 0.0  # turns -0 into 0
     return f"({rounded[0]:.3g}, {rounded[1]:.3g}, {rounded[2]:.3g})"
 
 
 def _six_motions(dofs: Dofs) -> tuple[FloatArray, FloatArray, float]:
     """Return translations and rotations (n, 6) about the centre, the centre, and the body's size.
 
-    Rotations are those of an angle ``1 / size``, so that all columns are of like magnitude.
+    The angle of the rotations is ``1 / size``, so that all columns have similar magnitude.
     """
     place = np.array([COMPONENTS.get(c, -1) for c in dofs.component])
     known = np.all(np.isfinite(dofs.position), axis=1)
     position = dofs.position
-    if not known.any():  # a rigid body: all at its centre
+    if not known.any():  # a rigid body: all dofs at its centre
         known, position = np.ones(len(dofs), dtype=bool), np.zeros((len(dofs), 3))
     motions = np.zeros((len(dofs), 6))
     moving, turning = np.flatnonzero((place >= 0) & (place < 3) & known), np.flatnonzero(place >= 3)
@@ -163,7 +163,7 @@ def _six_motions(dofs: Dofs) -> tuple[FloatArray, FloatArray, float]:
     centre = position[moving].mean(axis=0)
     arm = position[moving] - centre
     size = float(np.max(np.abs(arm)))
-    if size <= ROUNDING * float(np.max(np.abs(position[moving]))):  # all at one place
+    if size <= ROUNDING * float(np.max(np.abs(position[moving]))):  # all points coincide
         arm, size = np.zeros_like(arm), 1.0
     direction = np.eye(3)[place[moving]]
     for i in range(3):

@@ -1,8 +1,8 @@
 r"""Rigid dampers whose mass and inertia follow from their section and length: a wedge with two flat sides, and a cylinder.
 
 Body axes: the origin is the apex, where the planes of the two platforms' undersides meet, in the middle of the length; x points
-from left to right, y along the prism, z outward. Mass or density is given, and the body is homogeneous: a designer has these
-numbers on the drawing. What is not homogeneous is a `RigidBody` with points of its own.
+from left to right, y along the prism, z outward. Mass or density is given, and the body is homogeneous: a designer finds these
+numbers on the drawing. For a body that is not homogeneous use a `RigidBody` with its own points.
 """
 
 import math
@@ -50,7 +50,8 @@ class WedgeDamper:
     Parameters
     ----------
     left_angle, right_angle
-        Inclination in rad of either side from x: the underside angle of the platform it touches. Right None: equal to the left one.
+        Inclination in rad of either side from x: the underside angle of the platform it touches. `right_angle` None: equal to
+        the left one.
     top_width, height
         Width of the section's outer end (0: sharp) and its extent along z, in metres.
     length
@@ -58,10 +59,10 @@ class WedgeDamper:
     mass, density
         Mass in kg or density in kg/m³; give one of them.
     left_distances, right_distances
-        Distances in metres of the lines of contact points from the apex along the side; None: three, each in the middle of a third
+        Distances in metres of the lines of contact points from the apex along the side; None: three, in the middle of each third
         of the side.
     sections
-        Axial positions y in metres, each with a point of each line; None: three, each in the middle of a third of the length.
+        Axial positions y in metres; each line has a point at each. None: three, in the middle of each third of the length.
 
     Raises
     ------
@@ -162,7 +163,7 @@ class CylinderDamper:
     radius, length
         Radius and length in metres.
     left_angle, right_angle
-        Inclination in rad from x of the platform's underside on either side. Right None: equal to the left one.
+        Inclination in rad from x of the platform's underside on either side. `right_angle` None: equal to the left one.
     mass, density, sections
         See `WedgeDamper`.
     contact_width

@@ -1,4 +1,4 @@
-r"""Sides of rigid dampers: where their points lie, and their frames.
+r"""Sides of rigid dampers: positions and frames of their contact points.
 
 Dampers are prisms along y between two platforms, and are pressed outward (+z) against their undersides. Both sides are
 described from the apex, the point of a section where the planes of the two undersides meet::
@@ -104,7 +104,7 @@ def points_of_lines(
 ) -> ContactPoints:
     """Return the points of `lines` at the `sections` (y in metres), line by line; the `apex` is at (x, z).
 
-    The side reaches over the `extent` along y, half of it on either side of y = 0; None: unknown.
+    The side has the length `extent` along y, centred at y = 0; None: unknown.
     """
     names, sides, positions, frames = [], [], [], []
     for line in lines:
@@ -120,7 +120,7 @@ def points_of_lines(
 
 
 def nearest(places: Sequence[float], low: float, high: float) -> FloatArray:
-    """Return the lengths of the parts of an interval from `low` to `high` that are nearest to each of the ascending `places`; their sum is its length."""
+    """Divide the interval from `low` to `high` among the ascending `places`; return the length nearest to each."""
     between = np.asarray(places, dtype=float)
     return np.diff([low, *(between[:-1] + between[1:]) / 2, high])
 

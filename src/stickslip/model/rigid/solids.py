@@ -19,7 +19,7 @@ class BodySolid:
     triangles
         (k, 3) points of each triangle.
     drawn_from
-        What is known of the body: its section, or its contact faces alone.
+        Source of the shape, for captions: the section, or the contact faces only.
     """
 
     points: FloatArray
@@ -44,7 +44,7 @@ def prism(outline: FloatArray, low: float, high: float) -> BodySolid:
 
 
 def from_faces(points: FloatArray, normals: FloatArray, centre: FloatArray) -> BodySolid | None:
-    """Return the convex body between contact points and the planes through the centre of mass that are parallel to them.
+    """Return the convex body between contact faces and parallel planes through the centre of mass.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def from_faces(points: FloatArray, normals: FloatArray, centre: FloatArray) -> B
     Returns
     -------
     BodySolid or None
-        None where all of this lies in a plane.
+        None if all points lie in a plane.
     """
-    from scipy.spatial import ConvexHull, QhullError  # a study file is refused before it is loaded
+    from scipy.spatial import ConvexHull, QhullError  # imported late: an invalid study file is refused sooner
 
     inward = np.einsum("pd,pd->p", centre - points, normals)
     every = np.vstack([points, points + inward[:, None] * normals])
