@@ -1,4 +1,4 @@
-"""What ``stickslip check`` says on a case: the computation and its cost, doubts, contacts at rest, and what stands beside the range."""
+"""Advice of ``stickslip check`` on a case: computation, cost, doubts, contacts at rest, natural frequencies."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -38,7 +38,7 @@ _ENDS_OF_SENTENCES = re.compile(r"(?<=[^.0-9])\. (?=[A-Z0-9a-z])|; |: ")
 
 
 def advice(case: Case, model: Model) -> Advice:
-    """Return what is known of a case before its solution."""
+    """Return the advice on a case before its solution."""
     question = question_of(case, model)
     with step(
         f"modes of {question.model.system.structure.n} coordinates in the range, and how far friction damps them"
@@ -124,7 +124,7 @@ def _listed(hertz: FloatArray, where: str) -> list[str]:
 
 
 def contacts_at_rest(question: Question) -> list[str]:
-    """Return the static forces of all contacts, then of each: closed and open points, normal forces, T/N."""
+    """Return the static forces of all contacts, then for each contact closed and open points, normal forces, T/N."""
     model = question.model
     normal, along = -model.static_force[:, 2], np.abs(model.static_force[:, :2])
     if not np.any(normal):

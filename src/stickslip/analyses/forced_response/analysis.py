@@ -71,8 +71,8 @@ from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ, millimetres
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
-COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
-BLADES = "blades"  # of a wheel whose sectors differ
+COMPILED = 5.0  # seconds of the first evaluation, below which the code was already compiled
+BLADES = "blades"  # note of a mistuned wheel
 BIFURCATIONS = "bifurcations"
 JACOBIANS = "jacobians"
 NOT_PERIODIC = "not_periodic"
@@ -87,7 +87,7 @@ NOTES = (
     HARMONICS,
     JACOBIANS,
     PHYSICS,
-)  # what makes up the dataset
+)  # notes that make up the dataset
 
 
 def _inputs(case: Case, model: Model) -> Question:
@@ -108,7 +108,7 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
             points.append(point)
             yield point
     except NO_SOLUTION as error:
-        failure = error  # what was found before counts
+        failure = error  # points found before are kept
         if not points:
             points.append(lost_point(inputs.problem, error))
             yield points[-1]
@@ -118,7 +118,7 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
         stage("the blades of the wheel")
         notes.put(BLADES, of_blades(inputs, response))
     if failure is not None and response.top is None:
-        raise failure  # nothing to judge
+        raise failure
     told = _judge(inputs, response, examined, notes)
     if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
         stage("bifurcations and side branches")
@@ -174,7 +174,7 @@ def _solved(question: Question, done: Sequence[ForcedPoint]) -> Iterator[ForcedP
 
 
 def _of_physics(question: Question, response: Response) -> Values:
-    """Return the properties of the modes of a case, and the sensitivity of its peak to the model, which balances tell."""
+    """Return the properties of the modes of a case and, for harmonic balance, the sensitivity of its peak."""
     told = of_physics(question, response) | motion_at_peak(question, response)
     if question.stepping is not None:
         return told
@@ -205,7 +205,7 @@ def _store_notes(question: Question, response: Response, examined: Sequence[Exam
 
 
 def _judge(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
-    """Make the requested time integrations, and return the stability known then."""
+    """Run the requested time integrations, and return the stability with their outcome."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
     checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
@@ -252,7 +252,7 @@ def _bifurcations(question: Question, response: Response, examined: Sequence[Exa
 
 
 def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:
-    """Predict the change by more harmonics, and compare Jacobians, where that is asked for."""
+    """Predict the change by more harmonics, and compare Jacobians, if requested."""
     if HARMONICS in question.checks:
         stage("what more harmonics change at every point")
         doubt = check_harmonics(question, response)
@@ -275,7 +275,7 @@ def _compile(question: Question) -> None:
         if always_kept(problem.strategy) is None:
             judged(problem.strategy, problem.step(problem.low, x, omega))
     except NO_SOLUTION:
-        return  # the response says what is wrong
+        return  # the solution will report the error
     seconds = perf_counter() - start
     if seconds > COMPILED:
         LOG.info(f"compiled the contact laws in {seconds:.0f} s; needed once after installing")
@@ -286,7 +286,7 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     first, last = sweep.ends
     along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
-    if sweep.single or point.shot:  # repeats come in between, or none at all
+    if sweep.single or point.shot:  # such a sweep has repeats between its points, or none
         shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
     shares["check"] = shares["peak"]
     begin, width = shares.get(point.stage, (0.0, 0.95))

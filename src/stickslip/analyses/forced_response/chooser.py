@@ -96,7 +96,7 @@ class Chooser:
             "indicator_name": self.indicator,
             "error_over": listed(self.over),
         }
-        # the name that results have had from the beginning
+        # a second name, which results of early versions have
         return own | ({"alert_threshold_percent": 100 * self.threshold} if self.is_error else {})
 
     def lines(self, passages_asked: str) -> list[str]:
@@ -164,7 +164,7 @@ class Chooser:
 
 
 def _audited(response: Response) -> str:
-    """Say on what the points rest: solved again, exact, or predicted."""
+    """State the accuracy of the points: solved again with more harmonics, exact, or judged by prediction."""
     every = [a for a in response.accepted if a.point.converged]
     again = [a.audit_error for a in every if not np.isnan(a.audit_error)]
     rest = [a for a in every if np.isnan(a.audit_error)]

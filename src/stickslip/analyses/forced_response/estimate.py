@@ -15,17 +15,17 @@ from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS
 from stickslip.study.file.model.loads import Limits
 from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
-POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
-# repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+POINTS = 1.7  # points of a branch for each requested point: more are taken where the response turns
+# repeats and failed attempts included: 1 to 19 in a case of the two blades, 6 over all its cases, 11 for four masses
 NEWTON_A_POINT = 6
 FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
-AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
+AT_THE_CAP = 0.1  # share of points that "auto" solves with the highest harmonics allowed
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
-FEWEST_A_POINT = 2  # where hardly a contact slips: two wheels took 1.6 to 3
-SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
-# of a step where hardly a contact slips: 10 ms with 190 to 300 unknowns, 12 to 30 ms with 440 to 570, 20 ms with 1900
+FEWEST_A_POINT = 2  # Newton steps if hardly a contact slips: two wheels took 1.6 to 3
+SECONDS_A_STEP = 1.5e-3  # of a Newton step, even with few unknowns
+# if hardly a contact slips, a step takes 10 ms with 190 to 300 unknowns, 12 to 30 ms with 440 to 570, 20 ms with 1900
 SECONDS_AN_UNKNOWN = 3e-5
-# where nothing is condensed, of a step with a new factor: 32 µs with 2000 contacts and 27 with 5000; 13 with a kept one in gross slip
+# without condensation: 32 µs with 2000 contacts, 27 with 5000, with a new factorisation; 13 with a reused one in gross slip
 SECONDS_A_WHOLE_UNKNOWN = 4e-5
 BYTES_A_WHOLE_UNKNOWN = 2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
@@ -52,7 +52,7 @@ class Estimate:
         contacts slip at every point, and the largest plausible number of points needs all harmonics. Stability and time integration are not
         counted.
     most
-        Assumption on harmonics behind the most, in words; empty if their number is fixed.
+        Assumption on harmonics behind `most_seconds`, in words; empty if their number is fixed.
     """
 
     nodes: int
@@ -93,7 +93,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     kept = always_kept(sweep.strategy)
     some = AT_THE_CAP if sweep.auto else REPEATED
     share_high = {"low": 0.0, "high": 1.0}.get(kept or "", some)
-    # each strategy looks at the larger space about once a point
+    # each strategy evaluates the balance with all harmonics about once a point
     judged = 0 if kept else points * some if sweep.auto else points
     steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
@@ -101,7 +101,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
         (SECONDS_A_WHOLE_UNKNOWN * n if whole else _flops(n) / FLOPS) + SECONDS_A_STEP for n in (low, high)
     )
     most_seconds = steps_low * of_low + (steps_high + judged) * of_high
-    # without a budget strategies look at the larger space wherever they stand
+    # strategies without a budget evaluate the balance with all harmonics at every point
     easy_low, easy_high = (SECONDS_AN_UNKNOWN * n + SECONDS_A_STEP for n in (low, high))
     easy = FEWEST_A_POINT * points * (easy_high if kept == "high" else easy_low)
     least_seconds = min(easy + (0 if sweep.auto else judged * easy_high), most_seconds)
@@ -123,7 +123,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
 
 
 def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:
-    """Return how many numbers a Newton step stores at once."""
+    """Return the number of values that a Newton step stores at once."""
     if sectors > 1:  # a factor of each harmonic and the wheel's matrices
         return 12 * (unknowns + 4 * coordinates) * coordinates
     if unknowns <= MAX_ARRAY_UNKNOWNS:  # an array of all harmonics together, and its factors
@@ -145,7 +145,7 @@ def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
 
 
 def _flops(unknowns: int) -> int:
-    """Return the operations of a Newton step; above a size a Krylov method factorises the harmonics separately."""
+    """Return the operations of a Newton step; large systems are solved by a Krylov method, harmonic by harmonic."""
     return 4 * unknowns * min(unknowns, FACTORISED) ** 2
 
 
@@ -172,7 +172,7 @@ def nodes_of(model: Model) -> int:
 
 
 def retained_of(model: Model) -> int:
-    """Return the number of retained coordinates: those of free rigid bodies, and the smaller of contact dofs and contact motions."""
+    """Return the number of retained coordinates: free rigid bodies, and contact dofs or contact motions if these are fewer."""
     bodies = np.zeros(model.places.n, dtype=bool)
     bodies[model.places.bodies()] = True
     both = scipy.sparse.hstack([model.pairs.own, model.pairs.following], format="csr")

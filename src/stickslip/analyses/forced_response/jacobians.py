@@ -53,7 +53,9 @@ class Compared:
 
 
 def reference_of(sweep: Sweep, retained: int, solved: int = 0) -> Harmonics:
-    """Return the harmonics of the large Jacobian: `harmonics.high`; with ``auto`` those of the solutions, at least five, as far as the rows go.
+    """Return the harmonics of the large Jacobian.
+
+    They are `harmonics.high`, or with ``auto`` the harmonics of the solutions, at least five, within `MAX_COMPARED_ROWS`.
 
     Parameters
     ----------
@@ -116,7 +118,7 @@ def _lines(record: Jacobians, low: Harmonics, reference: Harmonics) -> Iterator[
 
 
 def _compared(problem: ForcedProblem, large: HarmonicBalance, accepted: Accepted) -> Compared | None:
-    """Compare the Jacobians at the solutions of one frequency; None where one of them is not found, or J is singular."""
+    """Compare the Jacobians at the solutions of one frequency; None if a solution is not found, or J is singular."""
     point = accepted.point
     if not point.converged:
         return None
@@ -132,7 +134,7 @@ def _compared(problem: ForcedProblem, large: HarmonicBalance, accepted: Accepted
 
 
 def _solution(problem: ForcedProblem, balance: HarmonicBalance, accepted: Accepted) -> FloatArray | None:
-    """Return the unknowns with the harmonics of `balance`: those of the sweep where it has them, else Newton's method from the accepted point."""
+    """Return the unknowns with the harmonics of `balance`, from the sweep or by Newton's method from the accepted point."""
     for known in (accepted.point, accepted.low):
         if known is not None and _holds(known, balance):
             return balance.unknowns(known.coefficients)

@@ -40,8 +40,8 @@ from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.verdict import said
 from stickslip.units import HZ, RPM
 
-MULTIPLE = 3  # of the highest harmonic that loads drive, which friction answers with
-SINGLE_FREQUENCY_MARGIN = 1e-3  # of a frequency that stands alone: half the width of its range
+MULTIPLE = 3  # multiple of the highest driven harmonic in which friction responds
+SINGLE_FREQUENCY_MARGIN = 1e-3  # relative half-width of the range of a single frequency
 
 
 def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1,)) -> Sweep:
@@ -104,7 +104,7 @@ def sweep_through(settings: Any, table: Any, omega_range: tuple[float, float], d
 
 
 def measured(sweep: Sweep, model: Model) -> Sweep:
-    """Return a sweep with the amplitude and the error norm of a model; errors are relative to the answer, or as published if the model names places."""
+    """Return a sweep with the amplitude and the error norm of a model; the norm is as published if the model names places."""
     relative_to: RelativeTo = "answer" if model.alert_over in ANSWER else "each"
     return replace(sweep, amplitude_of=model.amplitude_of, relative_to=relative_to)
 
@@ -128,11 +128,11 @@ def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, floa
 
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
-STABLE = "stability"  # what every run finds out unless the study says no
+STABLE = "stability"  # check of every run, unless the study turns it off
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
-TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
-ALONE = "of what contacts, loads and outputs keep alone"  # in the same: no fewer modes help
-MAX_COMPARED_ROWS = 2000  # of dense Jacobians: some seconds a point
+TOO_MANY = "are more than"  # part of the sentence on a motion that was not integrated
+ALONE = "of what contacts, loads and outputs keep alone"  # part of the same sentence, if fewer modes do not help
+MAX_COMPARED_ROWS = 2000  # rows of dense Jacobians: some seconds a point
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
 
@@ -146,7 +146,7 @@ class Question:
     label
         Label of the case; empty for a study without [vary].
     model
-        The assembled model; its peak is that of the first output.
+        The assembled model; the first output defines the peak.
     sweep
         Sweep: how the response is computed.
     limit
@@ -176,7 +176,7 @@ class Question:
     similarity
         Whether Jacobians with few and with many harmonics are compared at every point.
     scene
-        What pictures show of the model; None without pictures.
+        Geometry for pictures of the model; None without pictures.
     stepping
         Time steps of a response by shooting; None: by harmonic balance.
     """
@@ -271,7 +271,7 @@ def with_comparisons(question: Question, case: Case, model: Model) -> Question:
     more = more_modes(model, order, case.store)
     more = None if more is None else peak_first(more)
     richer = None if more is None else (more.system, more.load)
-    # pictures have one sector, contacts of a mistuned wheel are those of all sectors
+    # pictures show one sector, but a mistuned wheel has the contacts of all sectors
     scene = scene_of(model, order) if model.mistuning is None else None
     return replace(question, richer=richer, extent=extent_of(model, order), scene=scene)
 
@@ -290,10 +290,10 @@ def question_of(case: Case, model: Model) -> Question:
     sweep = measured(sweep, model)
     stepping = stepping_of(settings, sweep)
     _refuse_beforehand(case, model, sweep, stepping)
-    # solutions are judged towards up to three times the harmonics that are kept
+    # solutions are judged with up to three times the kept harmonics
     harmonics = JUDGED_MULTIPLE * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
-        harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
+        harmonics = max(harmonics, model.sectors // 2)  # to excite all waves of a wheel
     assembled = assemble(model, harmonics, case.store)
     asked = settings.forced_response
     examined = asked.stability != "off" or asked.bifurcations in ("all", "branches")
@@ -332,7 +332,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _refuse_beforehand(case: Case, model: Model, sweep: Sweep, stepping: TimeStepping | None) -> None:
-    """Refuse what the model cannot answer, before it is assembled; `stepping` is that of a response by shooting."""
+    """Refuse what the model cannot answer, before it is assembled; `stepping`: time steps of a response by shooting."""
     settings = case.settings
     if stepping is not None:
         require_shooting(settings, model, case.checks)

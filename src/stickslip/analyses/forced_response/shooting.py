@@ -1,4 +1,4 @@
-"""``[forced_response] method = "shooting"``: its frequencies and steps, what it refuses, and what it says of itself."""
+"""``[forced_response] method = "shooting"``: frequencies, time steps, refusals, lines of ``stickslip check``."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,9 +16,9 @@ from stickslip.response.time.shooting import TOLERANCE
 from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping
 
-REPORTED = 25  # highest harmonic stored of a motion, where the study gives none
-DRIVEN_MULTIPLE = 3  # of the highest driven harmonic, at least
-MAX_PERIODS = 1000  # of a frequency: warm-up, corrections, and plain periods where these lead nowhere
+REPORTED = 25  # highest stored harmonic of a motion, if the study sets none
+DRIVEN_MULTIPLE = 3  # least ratio of the highest stored to the highest driven harmonic
+MAX_PERIODS = 1000  # limit at a frequency: warm-up, corrections, and plain periods if corrections fail
 MAX_COORDINATES = 600  # half a second a period
 METHOD, BALANCE = "forced_response.method", 'give method = "balance"'
 WITHOUT_HARMONICS = (  # keys of [harmonics] that choose or judge harmonics of a balance
@@ -66,7 +66,7 @@ def stepping_of(settings: Any, sweep: Sweep) -> TimeStepping | None:
 
 
 def require_shooting(settings: Any, model: Model, checks: frozenset[str]) -> None:
-    """Refuse keys, checks and models that shooting has no use or no form for, before anything is assembled.
+    """Refuse keys, checks and models that do not apply to shooting, before anything is assembled.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def _default(table: Any, key: str) -> Any:
 
 
 def require_in_time(model: Assembled, sweep: Sweep, stepping: TimeStepping) -> None:
-    """Refuse an assembled model without a form in time, or with too many coordinates for it."""
+    """Refuse an assembled model that cannot be integrated in time, or has too many coordinates for it."""
     system = model.system
     if system.structure.n > MAX_COORDINATES:
         raise input_error(

@@ -29,7 +29,7 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import LEVELS, said
 
-FIRST = "first harmonic"  # what amplitudes are as a rule
+FIRST = "first harmonic"  # usual definition of amplitudes
 HEAD = ("peak mm", "at Hz")
 
 
@@ -173,7 +173,7 @@ def cost_sentence(data: xr.Dataset) -> str:
 
 
 def more_name(data: xr.Dataset) -> str:
-    """Return the name of points with other harmonics than those of the first passage."""
+    """Return the name of points with other harmonics than the first passage."""
     kept = {tuple(np.flatnonzero(row)) for row in read(PointFields, data).harmonic_kept}
     supports = [tuple(np.atleast_1d(data.attrs[f"{w}_harmonics"])) for w in ("low", "high")]
     alike = kept <= set(supports) and np.isfinite(data.attrs["selection_threshold"])

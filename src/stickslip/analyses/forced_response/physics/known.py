@@ -13,7 +13,7 @@ from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
 
 COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
-RIGID = 5e-3  # Hz that are printed as zero
+RIGID = 5e-3  # Hz; lower frequencies are printed as zero
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -99,7 +99,7 @@ def off_engine_order(question: Question) -> tuple[Verdict, ...]:
 
 def no_resonance(question: Question) -> tuple[Verdict, ...]:
     """Doubt a sweep without any natural frequency, with contacts open or stuck."""
-    if len(question.driven) > 1:  # known are the frequencies of one harmonic
+    if len(question.driven) > 1:  # natural frequencies are known for one harmonic
         return ()
     lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
     known = question.model.frequencies

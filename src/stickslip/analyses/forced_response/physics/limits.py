@@ -28,11 +28,11 @@ from stickslip.response.recovery import damped_share, equivalent_damping, signal
 from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ
 
-PHYSICS = "physics"  # the note of a job
-BESIDE = 0.01  # of a frequency: a resonance stands so near to the mode that it belongs to
-# half the range of a normal force over its mean above which the estimate of what friction can do does not hold
+PHYSICS = "physics"  # name of a note of the job
+BESIDE = 0.01  # largest relative distance of a resonance from the frequency of its mode
+# half the range of a normal force over its mean, above which the estimate of friction damping does not hold
 STEADY = 0.5
-NAMED_MODES = 3  # that a sentence lists
+NAMED_MODES = 3  # modes that a sentence lists
 GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
 
 
@@ -95,7 +95,7 @@ def physics_of(question: Question) -> Physics | None:
         modes = [tuple(range_modes(system, load, within, own)) for own in (stuck, sliding)]
         harmonics = sorted(h for h, force in load.harmonics.items() if h and np.any(force))
         damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
-    except InputError:  # a table of aerodynamic coefficients that does not reach so far
+    except InputError:  # the range exceeds the table of aerodynamic coefficients
         return None
     return Physics(modes[0], modes[1], friction, tuple(damped))
 
@@ -173,7 +173,7 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         if not near:
             continue
         most = max(near, key=response.amplitude)
-        # a branch that was followed passes no resonance unseen, one that contacts stiffen or soften is finite there
+        # peaks may be missed between listed frequencies, on a followed branch only those limited by damping alone
         missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
         if missed and _damping(question, most) < UNDAMPED_RATIO:
             why = f"nothing damps the mode at {mode.hz:.2f} Hz while contacts stick, and nothing slips where it was solved: a larger peak may stand there"
@@ -269,8 +269,9 @@ ROTATIONS = ("rx", "ry", "rz")
 def motion_at_peak(question: Question, response: Response) -> Values:
     """Return rotations and strains of the motion at the peak, which limit linear kinematics; NaN if unknown.
 
-    Rotations are those of rigid bodies and of nodes with rotational dofs, and the mean slope of a meshed part from its clamp to an output; its
-    steepest slope is larger. The strain is the root mean square over the elastic parts; the largest strain is larger.
+    Rotations belong to rigid bodies and nodes with rotational dofs. A meshed part counts with its mean slope from the
+    clamp to an output; its steepest slope is larger. The strain is the root mean square over the elastic parts; the
+    largest strain is larger.
     """
     none = float("nan")
     rotation, strain, slipped = none, none, none

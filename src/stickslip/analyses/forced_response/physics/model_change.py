@@ -26,10 +26,10 @@ from stickslip.units import HZ
 Change = tuple[float, float]  # relative change of the amplitude, change of the frequency in Hz
 Found = tuple[ForcedProblem, ForcedPoint] | None
 UNKNOWN: Change = (float("nan"), float("nan"))
-BESIDE = 0.03  # half the width of a sweep about a peak, relative to its frequency,
-SWEPT_POINTS = 12  # and its points
-PEAK_POINTS = 4  # that resolve a peak found again
-AT_AN_END = 1e-9  # relative distance from an end of the sweep: no resonance, compared at its own frequency
+BESIDE = 0.03  # half-width of a short sweep about a peak, relative to its frequency
+SWEPT_POINTS = 12  # points of this sweep
+PEAK_POINTS = 4  # points added to resolve its peak
+AT_AN_END = 1e-9  # relative distance from an end of the sweep, below which a peak is no resonance
 
 
 def model_changes(question: Question, response: Response) -> Values:
@@ -80,7 +80,7 @@ def _at_resonance(question: Question, point: ForcedPoint) -> bool:
 
 
 def _richer(question: Question) -> tuple[System, HarmonicLoad] | None:
-    """Return the model with more modes and the sliders of the given one; None if none has the same coordinates."""
+    """Return the model with more modes and the sliders of the given model; None without one of the same coordinates."""
     own = question.model.system
     if question.richer is None or question.richer[0].retained_labels != own.retained_labels:
         return None
@@ -98,7 +98,7 @@ def _coarser(question: Question) -> tuple[System, int] | None:
 
 
 def _change(response: Response, own: Found, other: Found) -> Change:
-    """Return the difference of a peak from the model's own, found in the same way; NaN if one is not found."""
+    """Return the change of a peak from the model's own peak, found in the same way; NaN if either is not found."""
     if own is None or other is None:
         return UNKNOWN
     before, after = (problem.amplitude(point, response.output) for problem, point in (own, other))
@@ -106,7 +106,7 @@ def _change(response: Response, own: Found, other: Found) -> Change:
 
 
 def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> ForcedPoint | None:
-    """Find a peak by a short sweep if the solution at a point does not lead to that of another model; None at an end of the sweep."""
+    """Find the peak of another model by a short sweep if no solver finds it from a point; None at an end of the sweep."""
     around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
     short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
     problem = forced_problem(system, load, short)

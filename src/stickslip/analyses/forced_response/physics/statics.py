@@ -47,7 +47,7 @@ def slip_sentence(limits: FlankLimits) -> str:
 
 
 def angle_sentence(limits: FlankLimits) -> str:
-    """Return the platform angles at which a flank could not slip; empty for a flank that is no plane."""
+    """Return the platform angles at which a flank could not slip; empty for a flank that is not plane."""
     if not np.isfinite(limits.angle_deg):
         return ""
     own = f"{limits.flank.name} is inclined by {limits.angle_deg:.0f} degrees (0 is square to the pull)"

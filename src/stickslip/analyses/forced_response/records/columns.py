@@ -20,7 +20,7 @@ from stickslip.study.verdict import LEVELS, POINT_LEVELS
 
 Kind = TypeVar("Kind")
 STAGES = get_args(Stage)
-MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutral": 4}  # numbers of motion_stability
+MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutral": 4}  # codes of motion_stability
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -234,7 +234,7 @@ class ModelFacts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Drawn:
-    """What pictures show of the model, and its motion at the peak; nothing of a wheel whose sectors differ."""
+    """Geometry for pictures of the model, and its motion at the peak; empty for a mistuned wheel."""
 
     drawn_point: FloatArray = column(
         "m",
@@ -419,7 +419,7 @@ class SideBranches:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SidePoints:
-    """Points of such branches."""
+    """Points of side branches."""
 
     side_point_case: IntArray | None = column("1", "case of a point of such a branch", along="side_point", default=None)
     side_point_frequency_hz: FloatArray = column("Hz", "frequency of the load", along="side_point")
@@ -647,7 +647,7 @@ KINDS = (
 )
 COLUMNS: Mapping[str, Column] = {name: own for kind in KINDS for name, own in columns_of(kind).items()}
 
-# the variable with the case of each row, by the dimension along which the rows of cases follow each other
+# dimension of rows -> variable with the case of each row
 OWNERS = {own.along[0]: name for name, own in COLUMNS.items() if name.endswith("_case")}
 
 
@@ -659,10 +659,11 @@ def read(kind: type[Kind], data: xr.Dataset, case: int | None = None) -> Kind:
     kind
         One of `KINDS`.
     data
-        Dataset of `put_together`, of this or an earlier version. What it lacks is NaN, -1 or an empty text: single, or as many as its
-        points or rows.
+        Dataset of `put_together`, of this or an earlier version. Missing variables become NaN, -1 or an empty text, one
+        for each point or row.
     case
-        Index along ``case``: of its rows alone, without the dimension ``case``. None: of all cases; numbers of a case are arrays then.
+        Index along ``case``; the record then holds this case alone and lacks the dimension ``case``. None: all cases;
+        numbers of a case become arrays.
     """
     columns = columns_of(kind)
     owners = {d: OWNERS[d] for own in columns.values() for d in own.along if OWNERS.get(d) in data}
@@ -675,13 +676,13 @@ def read(kind: type[Kind], data: xr.Dataset, case: int | None = None) -> Kind:
 
 
 def rows_of_case(owner: IntArray, case: int) -> slice | IntArray:
-    """Return where `owner` is a case: a slice of neighbours, which copies no values."""
+    """Return the rows of a case from the case of each row; neighbouring rows as a slice, which copies no values."""
     at = np.flatnonzero(owner == case)
     return slice(int(at[0]), int(at[-1]) + 1) if at.size and np.ptp(at) < at.size else at
 
 
 def of_cases(kind: type[Kind], data: xr.Dataset) -> list[Kind]:
-    """Return the record of a kind of each case."""
+    """Return one record of a kind for each case."""
     return [read(kind, data, i) for i in range(data.sizes["case"])]
 
 
@@ -691,7 +692,7 @@ def holds(kind: type[Any], data: xr.Dataset) -> bool:
 
 
 def each(record: Kind) -> Iterator[Kind]:
-    """Yield the rows of a record whose fields all lie along the same dimension, as records of its entries."""
+    """Yield one record for each entry of a record whose fields all lie along the same dimension."""
     values = stored(record)
     for i in range(min(map(len, values.values()))):
         yield type(record)(**{name: value[i] for name, value in values.items()})

@@ -15,7 +15,7 @@ from stickslip.study.store.netcdf import variable
 from stickslip.study.verdict import said
 
 LABELLED = ("output", "retained", "contact", "driven", "mistuned")  # dimensions whose entries have names
-SOME = OWNERS.keys() - {"point", "attempt", "alert_point"}  # dimensions of what some cases may lack
+SOME = OWNERS.keys() - {"point", "attempt", "alert_point"}  # dimensions of variables that some cases may lack
 COUNTED = (
     "harmonic",
     "force_harmonic",
@@ -61,7 +61,7 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
 
 
 def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any]:
-    """Return the attributes of the dataset: texts and numbers; what chose the harmonics is that of the first case."""
+    """Return the attributes of the dataset, texts and numbers; the first case gives the selection of harmonics."""
     both = list(zip(labels, cases, strict=True))
     told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
     own: dict[str, Any] = json.loads(cases[0]["attributes"])
@@ -77,17 +77,17 @@ def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
 
 
 def _told(name: str, variable: xr.Variable) -> bool:
-    """Whether a variable has content: checks not requested and speeds of a response over frequency have none."""
+    """Whether a variable has content; checks not requested and speeds of a response over frequency have none."""
     nothing = name == "speed_rpm" and bool(np.all(np.isnan(variable.values)))
     return not nothing and variable.sizes.get(variable.dims[0], 1) > 0
 
 
 def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
-    """Return the variables of a case with their dimensions, and the number of the case in its rows."""
+    """Return the variables of a case with their dimensions, and the index of the case for each of its rows."""
     peak = int(values["peak_point"])
     values = values | {"peak_point": peak + before if peak >= 0 else peak}
     for own in OWNERS.values():
-        like = own.removeprefix("point_").replace("case", "frequency_hz")  # there is one for each row
+        like = own.removeprefix("point_").replace("case", "frequency_hz")  # a variable with one value a row
         if like in values:
             values[own] = np.full(len(values[like]), index)
     data = {

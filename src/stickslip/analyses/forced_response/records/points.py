@@ -16,7 +16,7 @@ from stickslip.response.verification import own_error
 from stickslip.solve.status import Status
 from stickslip.units import HZ
 
-FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
+FLANK = 0.7  # amplitude of the flanks of a peak over its amplitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,7 @@ class Response:
 
     @property
     def flanks(self) -> tuple[Accepted, ...]:
-        """The points on either side of the peak whose amplitude is nearest to a given fraction of the peak."""
+        """The points on either side of the peak whose amplitude is nearest to the fraction `FLANK` of the peak."""
         if self.top is None:
             return ()
         here, wanted = self.top.point.omega, FLANK * self.peak_amplitude

@@ -15,7 +15,7 @@ from stickslip.reduction.waves import excited_wave
 from stickslip.units import millimetres
 
 ROUNDING = 1e-12  # m
-MODES = 3  # whose modal force is told where a study does not say
+MODES = 3  # modes with a reported modal force, unless the study sets their number
 
 
 def pressure_lines(model: Model, modes: Mapping[str, int]) -> tuple[str, ...]:

@@ -297,7 +297,7 @@ def _of_peak(question: Question, response: Response) -> Values:
 
 
 def _of_drawn(question: Question, response: Response) -> Values:
-    """Return what pictures show of the model, and its motion at the peak."""
+    """Return the geometry for pictures of the model, and its motion at the peak."""
     scene, top = question.scene, response.top
     if scene is None or not len(scene.points):
         return {}
@@ -325,7 +325,7 @@ def _of_drawn(question: Question, response: Response) -> Values:
 
 def _of_attempts(question: Question, response: Response) -> Values:
     points = response.solved
-    # the accepted points do not tell it all: a branch with many harmonics takes the place of points that the alert spoke of
+    # a branch with many harmonics replaces accepted points, so the values of the alert come from all solutions
     alert = question.chooser.is_error
     asked = [p for p in points if alert and p.stage in ("low", "point") and not np.isnan(p.predicted_error)]
     return stored(

@@ -31,11 +31,11 @@ from stickslip.response.stability.found import Floquet
 from stickslip.study.analysis import Notes, Pieces
 from stickslip.units import HZ
 
-COUNTS = ("resting", "grazing", "transitions")  # of a stability
+COUNTS = ("resting", "grazing", "transitions")  # counts stored with a stability
 LEAVES = ("period doubling", "branch point")  # kinds from which a periodic branch is followed
 MOST_FOLLOWED = 6  # bifurcations of a case from which branches are followed
-MIN_WHEEL_MOTIONS = 40  # motions of a wheel that Hill's method looks at, however long it takes,
-HILL_SECONDS = 1800.0  # and in how long, by its estimate, it looks at more
+MIN_WHEEL_MOTIONS = 40  # motions of a wheel that Hill's method examines, however long it takes
+HILL_SECONDS = 1800.0  # estimated seconds within which it examines more
 NOT_FOLLOWED = "what leaves there is not followed: every sector of so large a wheel would count for itself"
 
 
@@ -74,7 +74,7 @@ class Remembered:
 
 
 def located(question: Question, response: Response, notes: Notes) -> Bifurcations:
-    """Return the bifurcations along the branch of a response: the kinds asked for; only folds if no multipliers are available."""
+    """Return the bifurcations of the requested kinds along a response; only folds if no multipliers are available."""
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
     branch = [a.point for a in every[:along]]
@@ -90,7 +90,7 @@ def located(question: Question, response: Response, notes: Notes) -> Bifurcation
 
 
 def _by_hill(problem: ForcedProblem, point: ForcedPoint, pieces: Pieces) -> Stability:
-    """Return the multipliers of a motion by Hill's method; none if it missed some of those it counted."""
+    """Return the multipliers of a motion by Hill's method; none if it found fewer than it counted."""
     found = hill_stability(problem, point, pieces.keep)
     if found.missing == 0:
         return found.stability

@@ -11,8 +11,8 @@ from stickslip.response.forced.other_motions import ANOTHER, OtherMotion, other_
 from stickslip.response.recovery import fields
 from stickslip.units import HZ
 
-SAME_FREQUENCY_RTOL = 0.005  # relative distance of frequencies within which a motion of the response is the same one
-ALIKE = 0.03  # relative difference of its amplitude
+SAME_FREQUENCY_RTOL = 0.005  # largest relative difference of frequency of a motion on the branch
+ALIKE = 0.03  # largest relative difference of its amplitude
 
 
 def motions_elsewhere(question: Question, response: Response) -> Values:
@@ -38,7 +38,7 @@ def motions_elsewhere(question: Question, response: Response) -> Values:
 
 
 def _on_branch(response: Response, other: OtherMotion) -> bool:
-    """Whether the response contains the motion elsewhere on its branch, as round a fold."""
+    """Whether the branch of the response contains the motion, for example beyond a fold."""
     return any(
         abs(a.point.omega / other.point.omega - 1.0) <= SAME_FREQUENCY_RTOL
         and abs(response.amplitude(a) / other.amplitude - 1.0) <= max(ALIKE, ANOTHER)

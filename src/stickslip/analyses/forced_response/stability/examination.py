@@ -7,17 +7,17 @@ from stickslip.response.stability.hill_method.hill_segment import NODES
 from stickslip.response.system import System
 from stickslip.response.time.sectors import different_sectors
 
-INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of the two blades
-PRODUCTS = 20  # of matrices for each of these
-FLOPS = 2e10  # a second, of such products on one core
-MOST_WORK = 60 * FLOPS  # of one examination
-MOST_WHEEL = 4 * FLOPS  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
-MOST_HILL = 300 * FLOPS  # of one examination by Hill's method, an upper bound: few contacts slip
-MOTIONS = 2.0  # that with more harmonics, and as it was solved
+INTERVALS = 12  # intervals between transitions for each contact: 2 to 18 at the peaks of the two blades
+PRODUCTS = 20  # matrix products for each interval
+FLOPS = 2e10  # operations of matrix products a second on one core
+MOST_WORK = 60 * FLOPS  # limit of one examination
+MOST_WHEEL = 4 * FLOPS  # the same for a forced motion of a wheel, whose other waves are reduced for this purpose alone
+MOST_HILL = 300 * FLOPS  # the same for Hill's method, whose estimate is an upper bound: few contacts slip
+MOTIONS = 2.0  # motions examined at a point: as solved, and with more harmonics
 
 
 def examination_work(system: System) -> float:
-    """Return the operations of one examination of two motions; on a wheel of all its sectors.
+    """Return the operations of one examination of two motions; on a wheel all sectors count.
 
     A travelling motion repeats itself in other sectors, so a fraction of the period suffices. Modes and multipliers of all
     coordinates are needed in any case and cost about as much as one interval.

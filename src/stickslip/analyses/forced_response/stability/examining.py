@@ -20,10 +20,10 @@ from stickslip.response.stability.found import changes
 from stickslip.response.stability.missing_harmonics import newton_work
 from stickslip.units import HZ
 
-ALWAYS_ROWS = 500  # of matrices, up to which every point is examined or follows from such
-CARRIED = 0.95  # largest modulus, its error included, of multipliers between which a verdict is carried along
-FURTHER = 10  # points that are examined to find the largest motion that is not unstable,
-FEW = 3  # and so many of them whatever has been spent
+ALWAYS_ROWS = 500  # rows of matrices up to which every point is examined, or inferred from examined points
+CARRIED = 0.95  # largest modulus of multipliers, error included, with which a verdict is inferred between two points
+FURTHER = 10  # points that are examined to find the largest motion that is not unstable
+FEW = 3  # points among them that are examined whatever has been spent
 
 Examine = Callable[[Accepted], Examined]
 
@@ -60,7 +60,7 @@ def examined_points(question: Question, response: Response, examine: Examine) ->
 def neighbours_of(
     question: Question, response: Response, examined: list[Examined], attained: list[float]
 ) -> list[Examined]:
-    """Return the points with undecided ones set to stable next to a point confirmed in time, on the same branch and with the same transitions."""
+    """Return all points; undecided ones are stable next to a point with the same transitions that is confirmed in time."""
     known = [e for e in examined if e.omega in attained]
     if not known or not any(e.verdict == "undecided" for e in examined):
         return examined
@@ -104,7 +104,7 @@ class _Search:
         return self.found[place]
 
     def along(self) -> None:
-        """Examine the points next to possible changes of stability, then bisect until the verdicts between two points follow from both."""
+        """Examine points next to possible changes of stability, then bisect until the points between follow from the ends."""
         for place in self._first():
             if self.spent > self.allowed:
                 return
@@ -150,7 +150,7 @@ class _Search:
                 own[k] = self._by_sign(k)
         return [own[k] for k in sorted(own)]
 
-    # --- what follows for points that are not examined ------------------------------------------
+    # --- points that are not examined ------------------------------------------------------------
 
     def _carries(self, a: int, b: int) -> bool:
         """Whether the verdict of two examined points holds for all points between them."""
@@ -158,7 +158,7 @@ class _Search:
             return False
         ends = (self.found[a], self.found[b])
         far = all(e.verdict == "stable" and e.multiplier + e.error < CARRIED for e in ends)
-        # where more harmonics lead to another motion, its transitions are not those of the points between as they were solved
+        # a verdict on a motion with more harmonics says nothing about points solved with fewer
         as_solved = all(e.raised is None for e in ends)
         return far and as_solved and self.course.like(a, b) and _inside_between(*ends)
 
@@ -215,10 +215,11 @@ class _Search:
         return self.response.accepted[self.course.order[place]].point.omega
 
     def _linear(self, place: int) -> Examined | None:
-        """Return the stability of a point without changes of contact state, from another one with the same states: both obey one linear system.
+        """Return the stability of a point without changes of contact state from a point with the same states.
 
-        Its exponents do not depend on the frequency of the load, and its multipliers are those of the other to the ratio of the periods.
-        Samples may miss a short slip; it acts on harmonics beyond those driven, so that the solution must be exact, too.
+        Both obey one linear system, whose exponents do not depend on the frequency of the load. The multipliers are the
+        other point's multipliers to the power of the ratio of the periods. Samples may miss a short slip, which acts on
+        harmonics that are not driven; therefore the solution must be exact, too.
         """
         cycle, side = self.course.cycle[place], self.question.model.system.structure
         point = self.response.accepted[self.course.order[place]].point
@@ -247,7 +248,8 @@ class _Search:
 def _inside_between(one: Examined, other: Examined) -> bool:
     """Whether no multiplier moves so far between two points that it may cross the unit circle.
 
-    A pair keeps the modulus of its damping while it moves along its circle, until it meets on the real axis: there one of the two may leave.
+    A complex pair moves along a circle, whose radius is set by its damping, until it meets on the real axis. There one
+    multiplier may leave the circle.
     """
     for a, b in ((one, other), (other, one)):
         _, moduli = changes(a.multipliers, b.multipliers)
@@ -276,7 +278,7 @@ def with_stable_peak(response: Response, known: list[Examined]) -> Response:
 
 @lru_cache(maxsize=2)
 def _course(question: Question, response: Response) -> Course:
-    """Return the course of a response; kept, because it is asked for after each motion in time."""
+    """Return the course of a response; cached, because each time integration needs it again."""
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
     return course_of(question.problem, [a.point for a in every], along, _jumps(response, along))

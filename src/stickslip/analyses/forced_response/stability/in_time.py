@@ -35,7 +35,7 @@ TOLD: dict[str, str] = {
 
 
 def off_percent(value: float, true: float) -> float:
-    """Return how far an amplitude is off a true one, in percent of it; infinite where that is zero and the amplitude is not."""
+    """Return the difference of an amplitude from the true one in percent; infinite if the true one alone is zero."""
     if true == 0.0:
         return 0.0 if value == 0.0 else float("inf")
     return 100 * (value - true) / true
@@ -50,7 +50,7 @@ class Check:
     frequency_hz
         Frequency of the point.
     balance, transient
-        Amplitudes, m; that of the integration is the average over its last third if it did not become periodic.
+        Amplitudes, m; for an integration that did not become periodic, the average over its last third.
     settled
         Whether the integration became periodic.
     periods
@@ -58,7 +58,7 @@ class Check:
     outputs_percent
         Largest difference of an output in percent, driven harmonics with their phases, in the error norm; NaN if not evaluated.
     scatter
-        Largest distance of a period's harmonics from that average over all outputs, relative to the average.
+        Largest distance of a period's harmonics from this average over all outputs, relative to the average.
     drifting
         Names of the coordinates whose mean drifts from period to period, separated by commas.
     order
@@ -168,21 +168,19 @@ class Check:
 
 
 NAMED = 3  # drifting coordinates that a sentence names
-MORE = 3  # times the harmonics, and the samples, of that repeat
-LEAST_HARMONICS, MOST_HARMONICS = 15, 63  # of it
-APART = 10.0  # percent: a motion in time that is farther from every balance is another one
-KICK = 1e-3  # of their own amplitude, by which speeds are disturbed where multipliers do not say that disturbances die
-SHOWN = 1e3  # times: a disturbance that has grown or decayed so much has shown what becomes of it
-RINGS = 1e-3  # scatter of a motion that repeats but for what goes on ringing
-DECAYS, GROWS = 0.5, 1.1  # change of the last third of an integration over that of the third before
-MOST_TOLD = 10**6  # periods
-GOLDEN = 2.399963  # rad, of which no few multiples are alike
-WHOLE = 41  # harmonics of an integration where amplitudes are of the whole motion
-REPORTED = 7  # harmonics of an integration, or those that the load drives
-FLOPS = 4e9  # a second, of a march
-MOST_STEPS = (
-    8 * STEPS
-)  # of an integration that is repeated with twice the steps for as long as these change it by more than `LARGE`
+MORE = 3  # factor on harmonics and samples of a repeated balance
+LEAST_HARMONICS, MOST_HARMONICS = 15, 63  # of a repeated balance
+APART = 10.0  # percent: a motion in time farther than this from every balance is another motion
+KICK = 1e-3  # disturbance of velocities relative to their amplitude, for motions not known to be stable
+SHOWN = 1e3  # growth or decay of a disturbance that shows the stability
+RINGS = 1e-3  # largest scatter of a motion that is periodic except for undamped ringing
+DECAYS, GROWS = 0.5, 1.1  # change within the last third of an integration over the change within the third before
+MOST_TOLD = 10**6  # largest number of periods that is stated
+GOLDEN = 2.399963  # golden angle, rad: phases of all coordinates differ
+WHOLE = 41  # harmonics of an integration, if amplitudes are of the whole motion
+REPORTED = 7  # least harmonics of an integration
+FLOPS = 4e9  # operations of time integration a second
+MOST_STEPS = 8 * STEPS  # steps are doubled as long as this changes the motion by more than `LARGE`
 
 
 def chosen(question: Question, response: Response) -> list[Accepted]:
@@ -204,7 +202,7 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
         One point of the response.
     multiplier
         Modulus of the multiplier of a point not known to be stable, NaN if unknown. The motion then starts with disturbed velocities and is
-        followed until the disturbance shows. None: neither.
+        followed until the disturbance shows. None: without a disturbance.
     """
     point = accepted.point
     after = 0 if multiplier is None else shows_after(multiplier)
@@ -232,7 +230,7 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
 
 
 def shows_after(multiplier: float) -> int:
-    """Return the number of periods in which a disturbance changes a thousandfold; for a modulus of 1 more than are ever integrated.
+    """Return the number of periods in which a disturbance changes a thousandfold, at most `MOST_TOLD`.
 
     Parameters
     ----------
@@ -316,7 +314,7 @@ def _compared(question: Question, response: Response, point: ForcedPoint, found:
 
 
 def _of_outputs(problem: ForcedProblem, true: ComplexArray, found: ComplexArray) -> float:
-    """Return the largest relative difference between outputs (H+1, n_outputs) and those of an integration, in the error norm."""
+    """Return the largest relative difference of outputs (H+1, n_outputs) from an integration, in the error norm."""
     if not np.all(np.isfinite(true)):
         return float("nan")
     rows = min(len(true), len(found))
@@ -374,7 +372,7 @@ def integrated(
     steps
         Time steps a period.
     kick
-        Disturbance of the initial velocities, as a fraction of the amplitude of each.
+        Disturbance of each initial velocity, as a fraction of its amplitude.
     least
         Smallest number of periods.
     """
@@ -383,7 +381,7 @@ def integrated(
     structure, contacts = system.structure, system.interface
     wheel = system.structure.wheel
     if wheel is not None:
-        # with every wave any sector may do something else: what leaves the tuned motion then does so here too
+        # with every wave, sectors may move differently, so that a disturbance can leave the tuned motion
         whole = all_sectors(system, load, every=wheel.has_every_wave)
         motion, structure, contacts = whole.spread(motion), whole.structure, whole.contacts
         load = whole.load

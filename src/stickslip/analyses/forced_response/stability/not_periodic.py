@@ -19,15 +19,15 @@ from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.units import HZ, millimetres, millimetres_between
 
-STEPS = 512  # in a period, at least
-AGREE = 0.1  # relative difference of a root mean square with half the step that counts as none
-TURNS = 128  # periods whose amplitudes are kept for the picture
-EQUAL_AMPLITUDE_RTOL = 1e-3  # relative difference of the amplitudes of all periods that counts as none
-# of its vibration: what is nearer to the balance may not have left it, and what has had the time to leave is still at it
+STEPS = 512  # least number in a period
+AGREE = 0.1  # largest relative difference of a root mean square with half the step
+TURNS = 128  # periods whose amplitudes are kept for the figure
+EQUAL_AMPLITUDE_RTOL = 1e-3  # relative difference of equal amplitudes
+# largest relative distance of a motion that has not left the balance, before and after a disturbance can have grown
 ESTIMATED_DISTANCE, ATTAINED_DISTANCE = 0.05, 0.01
-MARGIN = 1.5  # times the periods in which a kick grows to the size of the motion: the later half is compared
+MARGIN = 1.5  # factor on the periods in which a kick grows to the size of the motion, since the later half is compared
 MOST_PERIODS = 20_000
-MULTIPLE = 0.02  # of the frequency: a line of the spectrum that is farther from every multiple is another frequency
+MULTIPLE = 0.02  # share of the frequency: a spectral line farther than this from every multiple is another frequency
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class _March:
 def without_periodic(
     question: Question, response: Response, examined: Sequence[Examined]
 ) -> list[tuple[float, str, float]]:
-    """Return frequency (rad/s), reason and multiplier modulus of points without a valid balance solution, those nearest to the peak first."""
+    """Return points without a valid balance solution, the nearest to the peak first: rad/s, reason, multiplier modulus."""
     found = {
         a.point.omega: ("no periodic motion was found", np.nan) for a in response.accepted if not a.point.converged
     }
@@ -172,7 +172,9 @@ def _marched(question: Question, response: Response, omega: float, work: float, 
     most = max(MAX_PERIODS, min(2 * least, MOST_PERIODS))
     found = march(start, steps=STEPS, work=work, least=least, most=most)
     finer = None
-    if found.angle > 0.0 and not found.overflowed:  # what opens and closes may depend on the step
+    if (
+        found.angle > 0.0 and not found.overflowed
+    ):  # opening and closing contacts may make the motion depend on the step
         finer = march(found.final, steps=2 * found.steps, work=work, most=MIN_PERIODS)
     away = np.nan
     if near is not None and motion is not None and near.point.omega == omega:
@@ -274,7 +276,7 @@ def _settledness(spread: float, settled: bool) -> str:
 
 
 def _of_the_step(march: _March, own: int) -> str:
-    """Return why an integration is not reliable with its step; empty if it is."""
+    """Return why an integration is not reliable with its time step; empty if it is."""
     if march.finer is None:
         return ""
     if march.finer.coarse:
@@ -316,7 +318,7 @@ def _nothing(omega: float, why: str, count: int, said: str) -> Answer:
 
 
 def of_answers(answers: Sequence[Answer]) -> dict[str, Any]:
-    """Return the variables of these motions."""
+    """Return the variables of the motions in time."""
     return stored(
         MotionsInTime(
             not_periodic_frequency_hz=np.array([a.omega / HZ for a in answers]),

@@ -29,8 +29,8 @@ from stickslip.units import HZ
 
 Word = Literal["stable", "unstable", "neutral", "undecided", "not examined"]
 Basis = Literal["not examined", "examined", "carried", "by sign"]
-MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
-FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
+MOST_IN_TIME = 20.0  # largest estimated seconds of an integration without request
+FAR = 50.0  # percent: a motion farther than this has left a balance that could not be solved with more harmonics
 ONE_SECTOR = "what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
 BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not periodic": "unstable"}
 
@@ -44,7 +44,7 @@ class Examined:
     omega
         Frequency, rad/s.
     verdict
-        One of four words.
+        One of the words of `Word`.
     multiplier, error
         Modulus of the decisive multiplier and its error; NaN if unknown.
     reason
@@ -85,7 +85,7 @@ class Examined:
         return self.verdict in ("unstable", "undecided")
 
     def linear(self, size: float) -> str:
-        """Return why a point is stable whose contacts stay in the states of this point; `size` is the modulus of its largest multiplier."""
+        """Return why another point with the same contact states is stable; `size`: modulus of its largest multiplier."""
         return (
             f"no contact changes its state, as at {self.omega / HZ:.3f} Hz, so that the exponents are the same: the largest multiplier has the "
             f"modulus {modulus_text(size)}"
@@ -128,7 +128,7 @@ def examine(question: Question, accepted: Accepted, keep: Keep = not_kept) -> Ex
 
 
 def _of_shot(point: ForcedPoint) -> Examined:
-    """Return the stability of a motion found by shooting: by its multipliers, with their error by the time step."""
+    """Return the stability of a motion found by shooting from its multipliers; the time step gives their error."""
     (shot,) = point.shot
     floquet = Floquet(shot.multipliers)
     neutral = np.abs(floquet.multipliers - 1.0) <= UNIT_TOLERANCE
@@ -252,14 +252,14 @@ def with_motion(examined: Examined, check: Check | None) -> Examined:
     verdict = BY_MOTION.get(check.motion, examined.verdict)
     alone = np.isfinite(check.transient) and not np.isfinite(check.refined)
     if check.motion == "left" and alone and abs(check.difference_percent) < FAR:
-        verdict = "undecided"  # few harmonics may be so far off the motion that they stand for
+        verdict = "undecided"  # the difference may be the error of few harmonics
     if check.wanders_near:
-        verdict = "undecided"  # a machine does not leave it by more than it is known
+        verdict = "undecided"  # the motion stays within the error of the balance
     return replace(examined, verdict=verdict, motion=check.motion)
 
 
 def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
-    """Return whether the peak is integrated in time without being asked for: it is undecided, and the integration is short."""
+    """Return whether the peak is integrated in time without request: it is undecided, and the integration is short."""
     return (
         response.top is not None
         and any(e.position == response.peak and e.verdict == "undecided" and not e.motion for e in examined)
@@ -268,7 +268,7 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
 
 
 def integrable(question: Question) -> bool:
-    """Return whether motions are integrated in time without being asked for: examination is possible and short, and there is no structural damping."""
+    """Return whether motions are integrated in time without request: possible, short, and no structural damping."""
     system = question.model.system
     can = not why_not(question) and system.structure.of_harmonic(1).loss is None
     return can and seconds_in_time(system) < MOST_IN_TIME

@@ -14,7 +14,7 @@ from stickslip.response.stability.found import modulus_text
 from stickslip.study.verdict import said
 from stickslip.units import HZ
 
-FEW = 6  # points of a case that are told one by one
+FEW = 6  # points of a case with a sentence each
 BASES = ("not examined", "examined", "carried", "by sign")  # in the order of their numbers in the dataset
 MOST_RUNS = 12
 MOST_SENTENCES = 10
@@ -47,7 +47,7 @@ class Point:
 
 
 def point_of(examined: Examined) -> Point:
-    """Return a point from the stability of an examined one."""
+    """Return texts and numbers of an examined point."""
     e = examined
     return Point(e.omega / HZ, e.verdict, e.multiplier, e.error, e.sentence, e.basis)
 

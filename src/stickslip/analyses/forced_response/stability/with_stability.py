@@ -29,9 +29,9 @@ from stickslip.study.analysis import Notes, Pieces
 from stickslip.study.store.progress import LOG, stage
 from stickslip.units import HZ
 
-MOST_PEAKS = 3  # largest motions that are integrated in time, one after the other leaving
-MOST_DOUBTS = 20  # other motions that are integrated in time,
-SECONDS_OF_DOUBTS = 120.0  # estimated, of all of them
+MOST_PEAKS = 3  # largest motions integrated in time, each after the larger one proved unstable
+MOST_DOUBTS = 20  # other motions integrated in time
+SECONDS_OF_DOUBTS = 120.0  # estimated seconds for all of them
 
 
 @dataclass(eq=False)
@@ -47,7 +47,7 @@ class Looked:
     count
         Number of points requested.
     taken
-        Number of those that an interrupted run had examined.
+        Number of points that an interrupted run had examined.
     """
 
     question: Question
@@ -97,7 +97,7 @@ def with_stability(
 
 
 def _with_peak(response: Response, examined: list[Examined], look: Looked) -> list[Examined]:
-    """Examine the largest motion too if replaced points have changed which one it is."""
+    """Examine the largest motion as well, if replaced points have made another motion the largest."""
     for _ in range(MOST_PEAKS):
         peak = with_stable_peak(response, examined)
         known = {e.position for e in examined if e.basis != "not examined"}
@@ -112,8 +112,8 @@ def _with_peak(response: Response, examined: list[Examined], look: Looked) -> li
 def _examined(question: Question, response: Response, notes: Notes, look: Looked) -> list[Examined]:
     """Return the stability of all points; examinations of an interrupted run are used again.
 
-    Where a motion stays undecided and is soon integrated in time, that decides: of the peak, whose place another takes where the motion leaves it, then
-    of others.
+    A short time integration decides where multipliers leave a motion undecided. The peak comes first; if its motion is
+    left in time, the next largest motion becomes the peak. Other motions follow.
     """
     found = examined_points(question, response, look)
     look.tell()
@@ -144,14 +144,14 @@ def _doubts_in_time(question: Question, response: Response, examined: list[Exami
         try:
             check = integrated(question, response, own, found, notes)
         except InputError:
-            break  # a model that has no form in time keeps its doubts
+            break  # the model cannot be integrated: doubts remain
         found = [with_motion(e, check) if e.position == place else e for e in found]
         found = neighbours_of(question, response, found, [own.point.omega] * (check.motion == "attained"))
     return found
 
 
 def _open_places(question: Question, response: Response, examined: Sequence[Examined]) -> set[int]:
-    """Return the indices of points with undecided stability, and of those whose harmonics only a prediction doubts; without unstable ones."""
+    """Return the indices of undecided points, and of points, except unstable ones, with harmonics doubted by prediction."""
     undecided = {e.position for e in examined if e.verdict == "undecided" and not e.motion}
     unstable = {e.position for e in examined if e.verdict == "unstable"}
     threshold = question.problem.strategy.threshold

@@ -91,7 +91,7 @@ class Judged:
 
 
 def said_once(verdicts: Sequence[Verdict]) -> tuple[Verdict, ...]:
-    """Return verdicts of a case without clauses that an earlier one contains as its whole reason."""
+    """Return verdicts of a case without clauses that are the whole reason of an earlier verdict."""
     told: list[Verdict] = []
     for v in verdicts:
         known = [before.why for before in told if len(before.why) >= ALIKE]

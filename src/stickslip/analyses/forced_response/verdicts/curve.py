@@ -31,12 +31,12 @@ from stickslip.harmonic.harmonic_set import named
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.solve.status import Status
 
-JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
-LOSS_JUMP = 10.0  # ratio of neighbouring dissipations ...
-# ... whose difference is so many times those beside it: where slip begins they grow from one to the next
+JUMP = 2.0  # ratio of neighbouring amplitudes that no step along a branch reaches
+LOSS_JUMP = 10.0  # ratio of neighbouring dissipations at a jump
+# step of the dissipation at a jump over the steps beside it; at the onset of slip, neighbouring steps are similar
 LOSS_STEP = 4.0
-LOSS_COUNTS = 0.01  # share of the largest dissipation below which it does not matter
-LOSS_SEEN = 1e-6  # share of the energy that the contacts store below which it is rounding
+LOSS_COUNTS = 0.01  # share of the largest dissipation, below which a jump does not matter
+LOSS_SEEN = 1e-6  # share of the energy stored by the contacts, below which dissipation is rounding
 
 
 @dataclass(frozen=True)
@@ -86,14 +86,14 @@ def _of_amplitude(amplitude: FloatArray, few: BoolArray) -> dict[int, Jump]:
 
 
 def _of_loss(loss: FloatArray, elastic: float) -> list[Jump]:
-    """Return jumps of the dissipation. At the onset of slip it grows from zero too, but each step is similar to the next."""
+    """Return the jumps of the dissipation. At the onset of slip it also grows from zero, but in similar steps."""
     step = np.abs(np.diff(loss))
     least = max(LOSS_COUNTS * float(loss.max(initial=0.0)), LOSS_SEEN * elastic)
     found = []
     for k, (low, high) in enumerate(map(sorted, pairwise(loss))):
         beside = max([*step[max(k - 1, 0) : k], *step[k + 1 : k + 2]], default=0.0)
         if low <= LOSS_SEEN * elastic:
-            continue  # rounding: this is where slip begins
+            continue  # no dissipation yet: slip begins here
         if high > max(least, LOSS_JUMP * low) and step[k] > LOSS_STEP * beside:
             ratio = float(high / low)
             found.append(Jump(k, f"dissipation {ratio:.3g} times", ratio))
@@ -114,12 +114,12 @@ def stored_energy(gap: FloatArray | ComplexArray, force: FloatArray | ComplexArr
     return float(np.pi * np.nanmax(each, initial=0.0))
 
 
-DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
-ATTAINED = 1.0  # percent between a settled time integration and the balance
-HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
+DEFAULT_LIMIT = 5.0  # percent, for datasets without a limit
+ATTAINED = 1.0  # percent: largest difference between a settled time integration and the balance
+HUMP = 1.05  # least ratio of a distinct maximum to the least amplitude on either side
 UNSTABLE = MOTION["unstable"]
-CARRIED = 2  # the number of motion_stability_basis
-FREQUENCY_RTOL = 1e-9  # relative difference of frequencies that are one
+CARRIED = 2  # code of motion_stability_basis
+FREQUENCY_RTOL = 1e-9  # relative difference of equal frequencies
 
 
 def motion_of(said: TimeChecks) -> str:
@@ -152,7 +152,7 @@ def peak_output(data: xr.Dataset, case: int) -> int:
 
 
 def of_largest_blade(data: xr.Dataset, case: int) -> bool:
-    """Return whether the peak of a case is that of the largest blade of a mistuned wheel."""
+    """Return whether the output with the peak is on the largest blade of a mistuned wheel."""
     own = read(Blades, data, case)
     if own.largest_blade < 0 or not own.blade_peak_amplitude.size:
         return False
@@ -225,7 +225,7 @@ class Curve:
     @cached_property
     def converged(self) -> BoolArray:
         """(n,) whether there is a solution."""
-        return np.asarray(self.points.status <= Status.CONVERGED)  # below: not told
+        return np.asarray(self.points.status <= Status.CONVERGED)  # negative: status unknown
 
     @cached_property
     def branch(self) -> IntArray:
@@ -429,11 +429,11 @@ class Curve:
         return tuple(self._with_points(own, own.verify_frequency_hz, [-1] * own.verify_frequency_hz.size))
 
     def _with_points(self, rows: Kind, hz: FloatArray, words: Sequence[int]) -> Iterator[tuple[int, Kind]]:
-        """Yield the rows that have a point, with its index; a row says its frequency, and a word on the stability if it is not -1."""
+        """Yield each row with the index of its point, found by frequency and stability code (-1: unknown)."""
         for row, own, word in zip(each(rows), hz, words, strict=True):
             off = np.abs(self.hz - own) / self.hz
             near = np.flatnonzero(self.converged & (off <= FREQUENCY_RTOL))
-            # where points share a frequency the one with the same word on its stability is meant, then the peak, then the first
+            # of several points at a frequency, prefer the same stability, then the peak, then the first
             other = self.stability.motion_stability != word
             for point in sorted(map(int, near), key=lambda i: (off[i], other[i], i != self.peak))[:1]:
                 yield point, row

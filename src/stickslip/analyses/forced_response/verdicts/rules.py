@@ -81,7 +81,7 @@ LEAVING = dict.fromkeys(
 )
 FEWER = f"More time does not help. Fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates. Otherwise stability stays undecided."
 OPEN = "Neither more time nor fewer modes help. More harmonics make the errors of multipliers smaller."
-IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
+IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # remedy of a verdict
 
 
 def stability(case: Curve) -> Iterator[Finding]:
@@ -147,19 +147,19 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
 
 
 def fewer(sentence: str) -> str:
-    """Return the remedy for a model with too many coordinates for time integration; empty for smaller ones."""
+    """Return the remedy for a model with too many coordinates for time integration; empty for a smaller model."""
     if f"coordinates {TOO_MANY} {MOST_IN_TIME}" not in sentence:
         return ""
     return OPEN if ALONE in sentence else FEWER
 
 
-LARGEST_ROTATION_RAD = 0.1  # that linear kinematics describes
+LARGEST_ROTATION_RAD = 0.1  # limit of linear kinematics
 LARGEST_STRAIN = 3e-3
-LARGER = 0.01  # relative, than the peak
-SOFTER = 0.1  # relative change of the contact stiffness that sentences are about
-DECIDED = 0.05  # relative change of a peak by it above which a note says so
-LEAST_PERCENT, LEAST_HZ = 1e-3, 1e-6  # changes of a peak that are told as numbers
-LARGEST_SLIP_FACETS = 0.5  # of a facet: contact points stay opposite each other
+LARGER = 0.01  # least relative excess of another motion over the peak
+SOFTER = 0.1  # relative change of the contact stiffness in sentences
+DECIDED = 0.05  # relative change of a peak by softer contacts, above which there is a note
+LEAST_PERCENT, LEAST_HZ = 1e-3, 1e-6  # smallest changes of a peak that are stated as numbers
+LARGEST_SLIP_FACETS = 0.5  # slip over the size of a facet: contact points must stay opposite each other
 
 
 def physics(case: Curve) -> Iterator[Finding]:
@@ -268,7 +268,7 @@ PHYSICS_RULES: tuple[Rule, ...] = (physics, small_motions, model_itself, contact
 
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
-STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
+STUCK = 1e-18  # m/N, below the compliance of any structure: such a point sticks to a rigid contact or is held
 
 
 def unsolved(case: Curve) -> Iterator[Finding]:
@@ -294,14 +294,14 @@ def unsolved(case: Curve) -> Iterator[Finding]:
 
 
 def few_harmonics(case: Curve) -> Iterator[Finding]:
-    """Doubt a solution with too large a predicted error, and one that nothing has judged."""
+    """Doubt a solution with too large a predicted error, and a solution without any judgement."""
     if case.steps:
         yield from _coarse(case)
         return
     for i in np.flatnonzero(case.converged):
         own, solved = case.own_error[i], case.audit[i]
         if case.attained[i] or not np.isnan(solved):
-            continue  # what was solved or integrated tells more than a prediction
+            continue  # an audit or a time integration is more reliable than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
             remedy = f"{_more(case, int(i))}; {in_time_there(case, int(i))}."
@@ -321,7 +321,7 @@ def _coarse(case: Curve) -> Iterator[Finding]:
 
 
 def _more(case: Curve, point: int) -> str:
-    """Say how a point gets more harmonics, by what limits them: the study, the work of the response, its limits, or the largest number possible."""
+    """Return the remedy for too few harmonics, by their limit: study, work of the response, [limits], or `RUNGS`."""
     if not case.auto:
         return _of_selection(str(case.data.attrs.get("selection", "")))
     if case.own_error[point] <= case.limit:
@@ -334,10 +334,10 @@ def _more(case: Curve, point: int) -> str:
 
 
 def _of_selection(selection: str) -> str:
-    """Say which keys give more harmonics if they are not raised along the branch."""
+    """Return the keys that give more harmonics if they are not raised along the branch."""
     if selection == "always_low":
         return MORE_THAN_LOW
-    if selection in STRATEGIES and selection not in VERIFYING:  # "auto" is five to them
+    if selection in STRATEGIES and selection not in VERIFYING:  # they read "auto" as five harmonics
         return 'Give a larger harmonics.high, or harmonics.selection = "guarded_alert" with high = "auto"'
     return 'Give harmonics.high = "auto", or a larger number'
 
@@ -389,7 +389,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
 def on_other_motions(case: Curve) -> Iterator[Finding]:
     """Note neighbouring points on different motions; doubt them at the peak, and if either is not known to be stable with enough harmonics."""
     at = case.branch[case.converged[case.branch]]
-    if case.stepped or at.size < 2:  # between given frequencies any growth is possible
+    if case.stepped or at.size < 2:  # neighbouring listed frequencies may have any ratio of amplitudes
         return
     for jump in jumps(case.amplitude[at], case.dissipation[at], case.few[at], case.elastic):
         i, j = int(at[jump.step]), int(at[jump.step + 1])
@@ -431,7 +431,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             )
             yield Finding("doubtful", why, "The amplitude is uncertain by this much.", (point,))
         elif point in case.unstable and point != case.peak:
-            continue  # an answer: `unstable_stretches` tells of it
+            continue  # no doubt: `unstable_stretches` reports it
         elif motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
             why = f"the motion in time, started from it, {what}: {without_place(str(said.verify_sentence))}"
@@ -474,7 +474,7 @@ def not_periodic(case: Curve) -> Iterator[Finding]:
     for said in each(case.read(MotionsInTime)):
         sentence = str(said.not_periodic_sentence)
         why, off = without_place(sentence), np.abs(case.hz - said.not_periodic_frequency_hz)
-        # where a fold passes a frequency twice the peak is meant, as by other checks
+        # if a branch passes the frequency twice, the finding belongs to the peak, as in other checks
         point = case.peak if case.peak >= 0 and off[case.peak] == off.min() else int(off.argmin())
         settled = bool(said.not_periodic_settled)
         remedy = "Give it more time: forced_response.not_periodic_s."
@@ -500,7 +500,7 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
             "fold"
         )
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
-    elif case.at_the_end and case.hz.size > 1:  # of a frequency alone nobody asked for a peak
+    elif case.at_the_end and case.hz.size > 1:  # a single frequency has no peak
         why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
         if case.hump >= 0:
             size, hz = 1e3 * case.amplitude[case.hump], case.hz[case.hump]

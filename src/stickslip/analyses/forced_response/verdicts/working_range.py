@@ -16,9 +16,9 @@ from stickslip.study.varied import families, first_varied_number, key_name
 from stickslip.study.verdict import LEVELS, said
 
 Regime = Literal["stuck", "stiffens", "works", "lets go"]
-REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a dataset is its place
+REGIMES: tuple[Regime, ...] = get_args(Regime)  # datasets store the index of a regime
 HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
-MIN_PEAKS = 3  # peaks of a curve
+MIN_PEAKS = 3  # least number of peaks of a curve
 HELD_BY = (
     "ratio",
     "friction_coefficient",
@@ -27,10 +27,10 @@ HELD_BY = (
     "preload_n",
     "preload_pa",
     "interference_m",
-)  # the more of them, the longer contacts stick; ratio: pull over excitation
-FORCE = "force_n"  # of a load
-APART = 0.25  # of the cycle: by so much more an end sticks that is told by its contacts
-SLIDES_MORE = 2.0  # times the loss over the amplitude at the other end
+)  # keys that make contacts stick longer as they grow; ratio: pull over excitation
+FORCE = "force_n"  # key of a load
+APART = 0.25  # least difference of the sticking fractions of the cycle by which the stuck end is known
+SLIDES_MORE = 2.0  # least ratio of the losses per amplitude at both ends, for the same purpose
 SETTINGS = (
     "forced_response",
     "harmonics",
@@ -39,7 +39,7 @@ SETTINGS = (
     "reduction",
     "retention",
     "solver",
-)  # tables of how things are computed: over them no joint goes from stick to slip
+)  # numerical settings: varying them takes no joint from stick to slip
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ContactsAtPeak:
     sticking
         Fraction of the cycle in stick, averaged over all contacts.
     linear
-        Whether no contact slips, opens or closes, and none dissipates: the peak is that of a linear system.
+        Whether no contact slips, opens, closes or dissipates, so that the system is linear at the peak.
     holding
         Whether any contact sticks during the whole cycle.
     """
@@ -216,7 +216,7 @@ def sticks_at(peaks: Sequence[CurvePeak], key: str = "") -> Literal["low", "high
 
 
 def _excites(low: CurvePeak, high: CurvePeak) -> bool:
-    """Whether the varied force is the excitation: no static load, and none to which the excitation is proportional."""
+    """Whether the varied force is the excitation, not a static load, even one to which the excitation is proportional."""
     scaled = np.isclose(high.force * low.value, low.force * high.value, rtol=1e-9)
     return bool(scaled and not np.isclose(low.size, high.size, rtol=1e-3))
 
@@ -224,7 +224,7 @@ def _excites(low: CurvePeak, high: CurvePeak) -> bool:
 def _by_contacts(low: CurvePeak, high: CurvePeak) -> Literal["low", "high"] | None:
     """Return the end at which contacts stick for a much larger fraction of the cycle and dissipate less relative to the amplitude.
 
-    A contact that opens slips less, too: small differences of the share tell nothing.
+    A contact that opens also slips less, so small differences of the fraction prove nothing.
     """
     more = low.contacts.sticking - high.contacts.sticking
     holds, slides = (low, high) if more > 0.0 else (high, low)
@@ -306,7 +306,7 @@ def with_regimes(data: xr.Dataset) -> xr.Dataset:
 
 
 TITLE = "Where friction works"
-MOST_TOLD = 3  # curves with sentences; of more curves each has a line
+MOST_TOLD = 3  # curves described in sentences; with more curves, each gets one line
 
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:
