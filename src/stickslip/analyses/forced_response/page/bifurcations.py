@@ -76,7 +76,7 @@ def _marks(response: Response, kind: str, found: list[tuple[ShownCase, Bifurcati
 
 
 def _branches(figure: go.Figure, response: Response, case: ShownCase, over: float) -> int:
-    """Draw the branches of a case; return how many."""
+    """Draw the branches of a case; return their number."""
     found = read(SidePoints, response.data, case.index)
     every = np.unique(found.side_point_branch)
     for branch in every:

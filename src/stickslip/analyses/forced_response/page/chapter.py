@@ -54,11 +54,11 @@ from stickslip.report.quantities import (
 from stickslip.report.section import Block, Card, Section
 from stickslip.study.verdict import LEVELS
 
-_ALIKE = 0.01  # of the largest peak: so near each other peaks do not tell cases apart
+_ALIKE = 0.01  # largest difference of equal peaks, relative to the largest peak
 
 
 def _answer(response: Response) -> Card:
-    """Return the answer: the peak, of several cases the smallest one of the best verdict, and what to do next."""
+    """Return the answer and the next step: the peak, or for several cases the smallest peak with the best verdict."""
     cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
     if not cases:
         return Card(NONE, "peak", "No case has its peak yet.")
@@ -98,12 +98,12 @@ def _size(response: Response, case: ShownCase) -> str:
     return amplitude(response.peak_response(case) * (case.excitation if response.per_force else 1.0), response.length)
 
 
-# a study's key; a model in Python is answered once for each variant
+# a study has a key for variants; a Python model is solved once for each variant
 VARY = "[vary] of a study file, or in Python stickslip.compare of several models made by dataclasses.replace"
 
 
 def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
-    """Return what to do next: settle a doubt, sweep farther, compute beyond the last value, or between the neighbours."""
+    """Return the next step: settle a doubt, sweep farther, compute beyond the last value, or refine between neighbours."""
     if response.trust(best):
         return [f"Next: settle why it is {response.level(best)}, see above"]
     if not response.resonates(best):

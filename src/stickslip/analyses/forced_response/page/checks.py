@@ -20,7 +20,7 @@ from stickslip.report.quantities import (
 )
 from stickslip.response.stability.found import modulus_text
 
-BY_MOTION = ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
+BY_MOTION = ", the motion in time being "  # part of the sentence on a point with undecided multipliers
 
 
 def stability(response: Response) -> list[Table | Words]:
@@ -50,7 +50,7 @@ def stability(response: Response) -> list[Table | Words]:
 
 
 def shooting(response: Response) -> Table | None:
-    """Return a table with one row a case solved by shooting: how exactly its motions repeat, and what the time step makes wrong."""
+    """Return a table with one row a case solved by shooting: residual of the period, and error by the time step."""
     known = [(c, read(Shots, response.data, c.index)) for c in response.cases]
     known = [(c, own) for c, own in known if own.shot_steps.size]
     if not known:
@@ -171,7 +171,7 @@ def _lines(hz: FloatArray, heights: FloatArray) -> str:
     return "\n".join(known[:4]) or NONE
 
 
-_SETTLED = {0: "not settled", 1: "settled", -1: NONE}  # where older results do not name the motion
+_SETTLED = {0: "not settled", 1: "settled", -1: NONE}  # for older results, which do not name the motion
 
 
 def time_integration(response: Response) -> Table | None:

@@ -20,7 +20,7 @@ from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_tick
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.verdict import POINT_LEVELS
 
-COMPARED = 3  # curves that stay legible in one panel
+COMPARED = 3  # legible curves in one panel
 _BUTTONS = {
     "type": "buttons",
     "direction": "right",
@@ -88,16 +88,16 @@ MARKS = {
     STABLE: {"width": 1.8, "dash": "solid"},
     UNSTABLE: {"width": 1.8, "dash": "dash"},
     UNKNOWN: {"width": 0.7, "dash": "solid"},
-}  # as the literature draws branches
+}  # line styles as in the literature
 
 
 def _marked(response: Response) -> bool:
-    """Return whether curves are drawn by stability: where a result holds a point that is not known to be stable."""
+    """Return whether curves are drawn by stability: the result holds a point that is not known to be stable."""
     return bool((response.unstable | response.unknown_stability).any())
 
 
 def _lines(response: Response, case: ShownCase) -> list[go.Scatter]:
-    """Return a curve as lines by stability; none where every point is known to be stable, or stability was not asked for."""
+    """Return a curve as lines by stability; none if every point is stable, or stability was not examined."""
     if not _marked(response):
         return []
     at, x = response.points(case), abscissa(response)[0]
@@ -246,7 +246,7 @@ def _in_panels(response: Response, shown: Sequence[Panel]) -> tuple[go.Figure, s
     for k, panel in enumerate(shown):
         part = go.Figure()
         said = _draw(part, response, panel)
-        told = max(told, said, key=len)  # a band in any panel outweighs equal bounds in another
+        told = max(told, said, key=len)  # the sentence on a band is longer than the one on equal bounds
         place = {"row": k // across + 1, "col": k % across + 1} if len(shown) > 1 else {}
         for trace in part.data:
             own = str(trace.legendgroup), str(trace.name)
@@ -299,7 +299,7 @@ def _many(response: Response) -> tuple[go.Figure, str]:
 def frequency_response(response: Response) -> Plot | None:
     """Draw the responses of all cases, marked by the harmonics of each point (Gastaldi and Berruti 2017, fig. 4b).
 
-    More cases than a panel can name are drawn in panels; still more as lines of which three are named.
+    Many cases are drawn in several panels; still more cases as lines, three of them with names.
     """
     if not np.isfinite(response.accepted).any():
         return None

@@ -79,7 +79,7 @@ def _caption(response: Response) -> str:
 
 
 def _above(response: Response) -> str:
-    """State the outcome of the solutions with too large a predicted error; a solution with more harmonics overrules the prediction."""
+    """State the number of solutions with too large a predicted error; a solution with more harmonics overrules it."""
     audit = response.of_points.audit_error_percent
     above = response.converged & (response.of_points.own_error_percent > response.threshold)
     if not above.any():
@@ -94,7 +94,7 @@ def _above(response: Response) -> str:
 
 
 def _floor(response: Response) -> float:
-    """Smallest value drawn: smaller errors are rounding, other indicators may be smaller."""
+    """Return the smallest value drawn: smaller errors are rounding, but other indicators may be smaller."""
     return _SMALLEST_ERROR if response.is_error else _SMALLEST_INDICATOR
 
 

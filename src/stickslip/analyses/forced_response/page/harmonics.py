@@ -1,4 +1,4 @@
-"""Harmonics over frequency on the page: those kept, frequencies that needed more, the reasons, and what they cost."""
+"""Harmonics over frequency on the page: kept harmonics, frequencies that needed more, the reasons, and the cost."""
 
 from collections import Counter
 
@@ -26,9 +26,9 @@ from stickslip.report.quantities import (
 from stickslip.solve.status import Status
 
 _SHOWN = 12  # cases that stay legible below one another
-_EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
-_ROW, _LINE, _PANEL = (46, 13, 200)  # height of a panel, of each of its harmonics, and of all of these at most, pixels
-_TICKS = 12  # harmonics that an axis names
+_EDGE = 0.01  # margin as a share of the frequency range, so that marks at its ends are whole
+_ROW, _LINE, _PANEL = (46, 13, 200)  # pixels: height of an empty panel, of each harmonic, and of all harmonics at most
+_TICKS = 12  # largest number of labels on an axis
 
 
 def kept_harmonics(response: Response) -> Plot | None:
@@ -98,7 +98,7 @@ def _caption(response: Response, cases: list[ShownCase]) -> str:
     return text
 
 
-_NAMED = 4  # sets of harmonics that a cell names
+_NAMED = 4  # sets of harmonics that a cell lists
 
 
 def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, float]]:
@@ -131,7 +131,7 @@ def _harmonic_share(response: Response, case: ShownCase) -> float:
 
 
 def _why(response: Response, case: ShownCase) -> str:
-    """Describe the contacts at the peak of a case and the part of the higher harmonics."""
+    """Describe the contacts at the peak of a case and the share of the higher harmonics."""
     reasons = []
     state = states(response, case)
     if state.size and response.peak(case) >= 0:

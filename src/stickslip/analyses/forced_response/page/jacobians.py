@@ -13,9 +13,9 @@ from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import Plot, styled
 from stickslip.report.quantities import number, percent
 
-_FAINT = 1e-3  # of a stuck contact: smaller blocks are drawn white
+_FAINT = 1e-3  # relative to the block of a stuck contact: smaller blocks are drawn white
 _SCALE = "YlGnBu"
-_NUMBERED = 8  # harmonics up to which each block has its number
+_NUMBERED = 8  # largest number of harmonics for numbers in the blocks
 
 
 def jacobian_change(response: Response) -> Plot | None:
@@ -70,7 +70,10 @@ def _caption(response: Response, own: Jacobians) -> str:
 
 
 def jacobian_blocks(response: Response) -> list[Chooser | Plot]:
-    """Draw the blocks of the Jacobian between harmonics at the peak, and those neglected (Gastaldi and Berruti 2017, fig. 1), below buttons for the case."""
+    """Draw the blocks of the Jacobian between harmonics at the peak, and the neglected blocks, with buttons for the case.
+
+    Source: Gastaldi and Berruti 2017, fig. 1.
+    """
     each = {c: read(Jacobians, response.data, c.index) for c in response.cases}
     known = {c: own for c, own in each.items() if np.isfinite(own.jacobian_block_norm).any()}
     if not known:

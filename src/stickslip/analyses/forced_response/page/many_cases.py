@@ -14,11 +14,11 @@ from stickslip.report.plot import COLOURS, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, number, scale_for
 from stickslip.study.varied import as_number, varied_values
 
-FEW = 8  # cases in a panel that a legend tells apart
+FEW = 8  # largest number of cases in the legend of a panel
 MOST_PANELS = 12
-MOST_IN_PANELS = 30  # cases; of more, three are named
-MOST_ROWS = 40  # of a map with one row a curve
-_COLOURS = (COLOURS[2], COLOURS[0], COLOURS[1])  # of the smallest, the middle and the largest peak
+MOST_IN_PANELS = 30  # cases; of more cases, three are named
+MOST_ROWS = 40  # rows of a map with one row a curve
+_COLOURS = (COLOURS[2], COLOURS[0], COLOURS[1])  # for the smallest, the middle and the largest peak
 _SCALE = [
     [0.0, "#f3f6fa"],
     [0.35, "#a9c6e2"],
@@ -26,7 +26,7 @@ _SCALE = [
     [1.0, "#0b2a57"],
 ]  # from the smallest peak to the largest
 _LINES = [[0.0, "#009e73"], [0.5, "#5b6673"], [1.0, "#d55e00"]]
-_FEW_COLUMNS = 12  # of a map whose cells hold their numbers
+_FEW_COLUMNS = 12  # largest number of columns of a map with numbers in its cells
 _ROW_HEIGHT, _AROUND = 26, 150  # px of a map
 
 
@@ -37,7 +37,7 @@ class Panel:
     Parameters
     ----------
     title
-        What they have in common; empty for a single panel.
+        Common values of these cases; empty for a single panel.
     cases
         The cases, each with its colour.
     names
@@ -52,14 +52,14 @@ class Panel:
 def panels(response: Response) -> tuple[Panel, ...]:
     """Return the panels of the curves of all cases: one for up to `FEW`, else one for each curve over the first number.
 
-    Empty where panels would be too many or too full; then `extremes` names some cases.
+    Empty if there would be too many panels or cases; `extremes` then chooses three cases.
     """
     cases = response.cases
     if len(cases) <= FEW:
         return (Panel("", cases, tuple(c.short for c in cases)),)
     key = first_number(response.data)[0]
     curves: Mapping[str, Sequence[ShownCase]] = families_of(response.data, key, cases)
-    if 2 * len(curves) > len(cases):  # texts, or values that do not recur: hardly two cases have anything in common
+    if 2 * len(curves) > len(cases):  # texts, or values that hardly recur: the cases form no curves
         curves = {"": cases}
     found = [_panel(name, part) for name, family in curves.items() for part in _parts(family)]
     return _coloured(found) if len(found) <= MOST_PANELS and len(cases) <= MOST_IN_PANELS else ()
@@ -79,7 +79,7 @@ def _panel(name: str, cases: Sequence[ShownCase]) -> Panel:
 
 
 def _coloured(found: Sequence[Panel]) -> tuple[Panel, ...]:
-    """Give cases of one name in several panels one colour."""
+    """Give cases with the same name in several panels the same colour."""
     names = list(dict.fromkeys(name for panel in found for name in panel.names))
     if len(names) > FEW:
         return tuple(found)
@@ -118,7 +118,7 @@ def all_peaks(response: Response, key: str, curves: Mapping[str, Sequence[ShownC
     curves
         Cases with a peak, by curve.
     caption
-        What the figure shows, in words.
+        Description of the figure.
     """
     cases = [case for curve in curves.values() for case in curve]
     columns = sorted({case.value for case in cases})
@@ -137,7 +137,7 @@ _ABOUT_AXES = "Each line is a case. Drag along an axis to choose a range of it. 
 
 
 def _bar(scale: Scale, response: Response, drawn: FloatArray) -> dict[str, object]:
-    """Return the key of the colours of logarithms of peaks."""
+    """Return the colour bar for logarithms of peaks."""
     ticks = log_ticks(drawn)
     at = np.array(ticks.get("tickvals", []), dtype=float)
     inside = (at >= drawn.min()) & (at <= drawn.max())

@@ -18,10 +18,10 @@ from stickslip.report.content import Words
 from stickslip.report.plot import GRID, INK, MUTED, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
 
-SURE = {"standard deviation": 2.0, "half-width": 1.0}  # bars within which a computed peak agrees
+SURE = {"standard deviation": 2.0, "half-width": 1.0}  # error bars within which computed and measured peaks agree
 WITHIN = {"standard deviation": "two standard deviations", "half-width": "the half-width"}
 _SYMBOLS = ("diamond-open", "square-open", "triangle-up-open", "cross-open", "star-open")
-_LOWEST = 0.99  # of a value, the longest bar downwards on a logarithmic axis
+_LOWEST = 0.99  # longest downward error bar on a logarithmic axis, as a share of the value
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def measured_of(response: Response, key: str) -> Measured | None:
 
 
 def _per_page(response: Response, values: FloatArray) -> FloatArray:
-    """Return the function from measured amplitudes to those of the page; NaN if the force is unknown."""
+    """Return (n,) factors from measured amplitudes to the unit of the page; NaN if the force is unknown."""
     measured = response.data.get("measured_amplitude")
     per_force = measured is not None and measured.attrs.get("units") == "m/N"
     if per_force == response.per_force:
@@ -169,7 +169,7 @@ def _per_page(response: Response, values: FloatArray) -> FloatArray:
 
 
 def _agrees(others: str, case: ShownCase) -> bool:
-    """Return whether a case has the other varied values of a point."""
+    """Return whether a case has the same other varied values as a measured point."""
     return not others or set(others.split(", ")) <= set(case.assigned)
 
 

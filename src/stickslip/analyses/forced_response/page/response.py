@@ -41,7 +41,7 @@ from stickslip.study.verdict import LEVELS, said
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
 _TURNS = (".rx", ".ry", ".rz")
-_BLADE = re.compile(r"\[\d+\]")  # of the label of an output
+_BLADE = re.compile(r"\[\d+\]")  # number of the blade in the label of an output
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Alert:
 
     case: IntArray
     hz: FloatArray
-    error: FloatArray  # percent, as predicted; of a strategy that predicts no error its indicator
+    error: FloatArray  # predicted, percent; for a strategy without predicted errors its indicator
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Response(Node):
 
     @property
     def mistuned(self) -> bool:
-        """Whether the peak is that of the largest blade of a mistuned wheel."""
+        """Whether the peak belongs to the largest blade of a mistuned wheel."""
         return bool(self.peaked) and all(of_largest_blade(self.data, c.index) for c in self.peaked)
 
     @property
@@ -140,7 +140,7 @@ class Response(Node):
         return f" ({self.labels('output')[self.outputs[case.index]]})" if self.mistuned else ""
 
     def at_outputs(self, values: FloatArray) -> FloatArray:
-        """Return, from values (point, ..., output), those of the output with the peak in the case of each point."""
+        """Select from values (point, ..., output) the output with the peak of each point's case."""
         return np.asarray(values[np.arange(len(values)), ..., self.outputs[self.point_case]])
 
     @property
@@ -203,7 +203,7 @@ class Response(Node):
 
     def level(self, case: ShownCase) -> str:
         """Return the level of the verdict on a case; empty for results without verdicts."""
-        found = np.atleast_1d(self.verdicts.case_verdict)  # of results without verdicts one missing number
+        found = np.atleast_1d(self.verdicts.case_verdict)  # a result without verdicts has a single missing number
         return LEVELS[int(found[case.index])] if found[0] >= 0 else ""
 
     def trust(self, case: ShownCase) -> int:
@@ -212,7 +212,7 @@ class Response(Node):
 
     @cached_property
     def alert(self) -> Alert:
-        """Solutions judged by the strategy; with raised harmonics, or if the file does not say, the accepted points that have an indicator."""
+        """Solutions judged by the strategy; with raised harmonics and in older files, the accepted points with an indicator."""
         asked, own = read(Attempts, self.data), self.of_points
         if asked.alert_case is not None and not self.auto:
             return Alert(asked.alert_case, asked.alert_frequency_hz, asked.alert_error_percent)
@@ -222,7 +222,7 @@ class Response(Node):
 
     @property
     def first_error(self) -> FloatArray:
-        """(point,) what the strategy compared with its threshold: predicted errors of first solutions in percent, or an indicator of its own."""
+        """(point,) value compared with the threshold: predicted error of the first solution in percent, or own indicator."""
         own = self.of_points
         return own.predicted_error_percent if self.is_error else own.indicator
 
@@ -303,7 +303,7 @@ class Response(Node):
 
     @property
     def more_name(self) -> str:
-        """Harmonics of these points as text: those of the reference if all points keep them all."""
+        """Harmonics of these points as text; the reference harmonics if all points keep them all."""
         some = self.kept[self.more]
         own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
         return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"

@@ -12,8 +12,8 @@ from stickslip.report.cases import ShownCase
 from stickslip.report.plot import GRID, INK, MUTED, Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import number, percent, quantity, scale_for
 
-GAP = "gap in m"  # at the end of the name of a deviation that is no relative one
-MIN_HISTOGRAM_CASES = 5  # cases from which on their amplifications make a histogram
+GAP = "gap in m"  # end of the name of a deviation in metres; other deviations are relative
+MIN_HISTOGRAM_CASES = 5  # least number of cases for a histogram of amplifications
 BLADE = "rgba(0, 114, 178, 0.25)"
 
 
@@ -77,7 +77,7 @@ def blades(response: Response) -> Plot | None:
 
 
 def _per_hz(response: Response, x: FloatArray) -> float:
-    """Return the factor from frequencies to the abscissa of a figure."""
+    """Return the factor from frequency (Hz) to the abscissa of a figure."""
     known = np.isfinite(x) & (response.hz > 0)
     return float(x[known][0] / response.hz[known][0]) if known.any() else 1.0
 
@@ -241,9 +241,9 @@ def statistics(response: Response) -> Plot | None:
 
 
 HUB, TIP = 0.55, 1.0  # radii in the picture
-REACH = 0.8  # share of a pitch by which the largest blade leans
-FRAMES = 24  # of a period
-MILLISECONDS = 60  # a frame
+REACH = 0.8  # largest lean of a blade as a share of the pitch
+FRAMES = 24  # frames a period
+MILLISECONDS = 60  # duration of a frame
 
 
 def leaning(motion: ComplexArray, phase: float) -> tuple[FloatArray, FloatArray]:

@@ -1,1 +1,1 @@
-"""What the page shows of the peak of each case: contacts, bodies, their motion, T/N."""
+"""Figures of the peak of each case: contacts, bodies, their motion, T/N."""

@@ -14,7 +14,7 @@ from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-_NOTHING = 1e-12  # J a cycle: what rounding leaves of newtons times micrometres
+_NOTHING = 1e-12  # J a cycle: rounding error of newtons times micrometres
 _AXIS_LINES = (
     {"color": "#0072b2", "dash": "solid", "width": 2},
     {"color": "#d55e00", "dash": "dash", "width": 2},

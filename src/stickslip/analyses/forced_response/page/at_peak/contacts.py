@@ -16,13 +16,13 @@ from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.tiles import outlines, patches
 
 _ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it is a line
-SHOWN_LOOPS = 6  # panels, of the points that dissipate most; the others are folded away
-_MOST_LOOPS = 24  # panels of both
-_FAR = 3.0  # mean of a loop over its half range, from which the picture would be an axis of equal digits
-_MOST_ROW = 4  # of them beside each other, where contact lines have more points
-_MOST_STATES = 40  # rows with a name of their own
-_MOST_SAMPLES = 40_000  # of all loops of a figure, and of all rows of states
-_FEWEST_SAMPLES = 32  # of a period
+SHOWN_LOOPS = 6  # panels shown, of the points that dissipate most; the others are folded away
+_MOST_LOOPS = 24  # panels shown or folded away
+_FAR = 3.0  # mean of a loop over its half range, above which the mean is removed so that ticks differ
+_MOST_ROW = 4  # panels in a row, if contact lines have more points
+_MOST_STATES = 40  # largest number of rows with names
+_MOST_SAMPLES = 40_000  # samples of all loops of a figure, or of all rows of states
+_FEWEST_SAMPLES = 32  # samples of a period
 
 
 def chosen_case(response: Response) -> Chooser | None:
@@ -51,7 +51,7 @@ def _wrapped(rows: list[list[int]]) -> list[list[int]]:
 
 
 def states(response: Response, case: ShownCase) -> IntArray:
-    """(contact, tangent, sample) states of a case at its peak; 0 stick, 1 slip, 2 open."""
+    """Return the (contact, tangent, sample) states of a case at its peak: 0 stick, 1 slip, 2 open."""
     return response.periods[case.index].peak_state
 
 
@@ -75,7 +75,7 @@ def state_keys() -> list[go.Scatter]:
 
 
 def drawn_samples(curves: int, samples: int) -> slice:
-    """Return the samples of a period to draw: with many curves every second, fourth ... one, to keep the page small."""
+    """Return the samples of a period to draw: every second, fourth ... one with many curves, to keep the page small."""
     step = 2 if samples >= 2 * 64 else 1
     while curves * samples // step > _MOST_SAMPLES and samples // (2 * step) >= _FEWEST_SAMPLES:
         step *= 2
@@ -83,7 +83,7 @@ def drawn_samples(curves: int, samples: int) -> slice:
 
 
 def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str) -> go.Scatter:
-    """One closed loop, its points coloured by state."""
+    """Return a closed loop, its points coloured by state."""
     closed = np.append(np.arange(len(gap)), 0)
     colour: dict[str, object] = {"color": MUTED}
     if state is not None:
@@ -124,25 +124,25 @@ def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
 
 
 def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> tuple[list[int], list[int]]:
-    """Return the contact points to draw, those that dissipate most in any case first: those shown, and those folded away; none without a force."""
+    """Return the contact points to draw, shown and folded away, by the most dissipation in any case; none without a force."""
     spans = [np.ptp(response.periods[c.index].peak_force[:, direction], axis=-1) for c in cases]
     acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0))
     area = np.max([_area(response, c, direction) for c in cases], axis=0)
     order = acting[np.argsort(-area[acting], kind="stable")].tolist()
     loops = [k for k in order if area[k] > 0]
-    most = _MOST_LOOPS if loops else _MOST_ROW  # straight lines are all alike
+    most = _MOST_LOOPS if loops else _MOST_ROW  # without slip all loops are straight lines: a few suffice
     shown = loops[:SHOWN_LOOPS]
     return shown, order[len(shown) : most]
 
 
 def _about_mean(values: list[FloatArray]) -> bool:
-    """Whether the mean of a loop (..., sample) is so far from zero that the picture needs it removed."""
+    """Whether the mean of a loop (..., sample) is so far from zero that it is removed from the figure."""
     every = np.nan_to_num(np.concatenate([v.reshape(-1, v.shape[-1]) for v in values]))
     return bool(np.any(np.abs(every.mean(axis=-1)) > _FAR * np.ptp(every, axis=-1) / 2))
 
 
 def _hysteresis(response: Response, direction: str) -> list[Plot]:
-    """Loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
+    """Draw loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
     column = {"t": 0, "w": 1}[direction]
     cases = tuple(c for c in response.peaked if np.isfinite(response.periods[c.index].peak_gap).any())
     shown, others = _panels(response, cases, column) if cases else ([], [])
@@ -168,7 +168,7 @@ def _hysteresis(response: Response, direction: str) -> list[Plot]:
 
 
 def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points: list[int]) -> tuple[go.Figure, str]:
-    """Return the panels of contact points in a tangential direction, and a sentence on means taken out of them."""
+    """Return the panels of contact points in a tangential direction, and a sentence on removed means."""
     names, rows = response.labels("contact"), _wrapped([points])
     width = max(len(r) for r in rows)
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
@@ -242,7 +242,7 @@ def _rubs(response: Response, case: ShownCase, rows: list[int]) -> BoolArray:
 
 
 def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[int], list[str]]:
-    """Return the rows of (contact, tangent) that are drawn and their names: one for a point that has no tangential motion."""
+    """Return the rows of (contact, tangent) to draw and their names; a point without tangential motion has one row."""
     names, tangents = response.labels("contact"), response.labels("tangent")
     n, rows, labels = len(tangents), [], []
     moves = np.ones((len(names), n), dtype=bool)
@@ -290,10 +290,10 @@ def state_map(response: Response) -> Plot | None:
     return Plot("states", title, caption, figure, captions, response.chosen)
 
 
-MIN_MAP_POINTS = 9  # points that make a surface worth a map
+MIN_MAP_POINTS = 9  # least number of points for a map of a surface
 THICK = 0.05  # second extent over the first, below which points stand in a line
 MOST_BESIDE = 3  # maps beside each other
-STEPS = 10  # of the colours of patches, from those that stick to those that slip all the time
+STEPS = 10  # colours of patches, from full stick to slip during the whole cycle
 _SLIP_SCALE = [[0.0, STATE_COLOURS[0]], [0.5, "#f4efe6"], [1.0, STATE_COLOURS[1]]]  # from stick to slip
 
 
@@ -341,7 +341,7 @@ def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
         arm = position[points] - position[points].mean(axis=0)
         extent = np.linalg.svd(arm, compute_uv=False)
         if extent[1] > THICK * extent[0]:
-            # the frame of the first point: those of a curved surface turn with it
+            # one frame for the map, although the frames of a curved surface turn
             found[group] = points, 1e3 * arm @ frame[points[0]][:, :2]
     return found
 

@@ -11,10 +11,10 @@ from stickslip.report.cases import ShownCase
 from stickslip.report.plot import MUTED, STATE_COLOURS, Plot, colour, legend_above, styled
 from stickslip.report.quantities import counted, joined, number
 
-MOST_PANELS = 8  # contacts
-MOST_POINTS = 8  # curves of a panel
-OPEN = 2  # of the words of a state, which give the colour
-AT_LIMIT = 0.999  # of the friction coefficient, from which a point is said to reach it
+MOST_PANELS = 8  # contacts, one panel each
+MOST_POINTS = 8  # curves in a panel
+OPEN = 2  # index of the state open, which gives the colour
+AT_LIMIT = 0.999  # share of the friction coefficient at which a point reaches its limit
 
 
 def ratios(response: Response, case: ShownCase, direction: int) -> FloatArray:
@@ -23,7 +23,7 @@ def ratios(response: Response, case: ShownCase, direction: int) -> FloatArray:
     T has the sign of the contact force in the tables and in the loops, N is positive in compression, and no mean is removed.
     """
     force = response.periods[case.index].peak_force
-    if force.shape[1] != 3:  # a result without them
+    if force.shape[1] != 3:  # the result lacks normal forces
         return np.full((len(force), force.shape[-1]), np.nan)
     along, pressed = force[:, direction], -force[:, 2]
     found: FloatArray = np.divide(along, pressed, out=np.full_like(along, np.nan), where=pressed > 0.0)
@@ -31,13 +31,13 @@ def ratios(response: Response, case: ShownCase, direction: int) -> FloatArray:
 
 
 def friction(response: Response, case: ShownCase) -> FloatArray:
-    """Return (contact,) friction coefficients; NaN where a law has none, or an early result does not say."""
+    """Return (contact,) friction coefficients; NaN for a law without one, and in early results."""
     own = response.periods[case.index].peak_friction
     return np.full(len(response.labels("contact")), np.nan) if own is None else own
 
 
 def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> dict[str, list[int]]:
-    """Return the points to draw of each contact: those that come nearest to their limit in any case."""
+    """Return the points of each contact that come nearest to their limit in any case."""
     with np.errstate(invalid="ignore"):
         used = [np.nan_to_num(np.abs(ratios(response, c, direction))).max(axis=1) for c in cases]
     most = np.max(used, axis=0)

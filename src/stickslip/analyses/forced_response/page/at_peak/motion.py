@@ -20,18 +20,18 @@ from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, INK, MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, styled
 from stickslip.report.quantities import joined, quantity
 
-MOST_BYTES = 600_000  # of all motions of a page, before they become text
-SAMPLES = 48  # of a period, of the states of contacts
-SMALLEST = 0.003  # of the largest amplitude: harmonics above the last one that reaches it are not drawn
-ARROW = 0.14  # length over the size of the picture
-FRAME = 0.05  # the same of the axes of contact frames
+MOST_BYTES = 600_000  # all motions of a page, before they become text
+SAMPLES = 48  # samples of contact states in a period
+SMALLEST = 0.003  # share of the largest amplitude; harmonics above the last one that reaches it are not drawn
+ARROW = 0.14  # length of an arrow over the size of the picture
+FRAME = 0.05  # the same for the axes of contact frames
 FULL = 32767  # largest 16-bit number
 MM = 1e3
-CONTACT_SHARE_OF_SIZE = 0.5  # of the size of the picture: smaller contacts have a view of their own
+CONTACT_SHARE_OF_SIZE = 0.5  # extent of contacts over the size of the picture, below which they have their own view
 FIXED = -1  # case of traces that a checkbox shows
 AXES = (("t", "#009e73"), ("w", "#cc79a7"), ("n", "#56b4e9"))
 SHOWN_AS = {"mesh": (STEEL, 0.45), "bodies": (BODY, 0.85)}
-MOST_NAMES = 4  # of contact points that do not cover each other
+MOST_NAMES = 4  # names of contact points that do not overlap
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def motion_of_case(response: Response, case: ShownCase) -> CaseMotion:
 
 
 def _cases(response: Response) -> dict[ShownCase, CaseMotion]:
-    """Return the motions that the page holds: the case shown first, then the others that look alike, as far as there is room."""
+    """Return the motions of the page: the case shown first, then cases with the same geometry, as far as there is room."""
     points = read(Drawn, response.data).drawn_point
     first = next(c for c in response.peaked if c.index == response.chosen)
     found: dict[ShownCase, CaseMotion] = {}
@@ -131,7 +131,7 @@ def in_motion(response: Response) -> Plot | None:
 
 
 def _payload(one: CaseMotion) -> dict[str, object]:
-    """Return a motion as text: 16-bit parts over the largest of them."""
+    """Return a motion as text: 16-bit numbers relative to the largest value."""
     parts = np.stack([one.coefficients.real, one.coefficients.imag], axis=-1)
     top = float(np.abs(parts).max(initial=0.0)) or 1.0
     return {
