@@ -26,7 +26,8 @@ class ContactPeriod:
     coefficients
         (2H+1, 3 n_contacts) real Fourier coefficients of the contact forces, N.
     blocks
-        (n_contacts, P, 2H+1, 2H+1) their derivatives by the coefficients of the gaps, N/m, in the order of `contact.law.PAIRS`.
+        (n_contacts, P, 2H+1, 2H+1) their derivatives by the coefficients of the gaps, N/m, in the order of
+        `contact.law.PAIRS`.
     by_omega
         (2H+1, 3 n_contacts) their derivatives by ω at fixed coefficients, N s; None where no force depends on velocity.
     gap, force
@@ -34,10 +35,10 @@ class ContactPeriod:
     state
         (n_contacts, 2, samples): 0 stick, 1 slip, 2 open, for t and w.
     unsettled
-        Contacts whose state did not become periodic.
+        Number of contacts whose state did not become periodic.
     events
-        State changes, from which `forces_between` gives the forces of more harmonics. None for contacts that are evaluated on samples
-        or marched, and where samples were requested.
+        State changes, from which `forces_between` gives the forces of more harmonics. None for contacts that are
+        evaluated on samples or marched, and where samples were requested.
     """
 
     coefficients: FloatArray
@@ -104,7 +105,7 @@ def contact_forces(
         samples = 0
     tables = _tables((m - 1) // 2, samples)
     gap_coefficients = contacts.from_sliders(gap_coefficients)
-    # one row a gap, so that an evaluator runs along it
+    # contiguous in time: evaluators run along one gap
     gap = (gap_coefficients.T @ tables.synthesis).reshape(contacts.n_contacts, 3, samples)
     parts = []
     if contacts.piecewise.size:
@@ -117,7 +118,7 @@ def contact_forces(
     for laws in contacts.marched:
         period = _marched(gap_coefficients, gap, laws, contacts.pairs, tables, omega)
         parts.append((laws.contacts, period))
-    # no contact at all is put together from nothing
+    # without any contact there is no part, and the result is zero
     whole = parts[0][1] if len(parts) == 1 else _put_together(parts, gap, contacts.pairs, m)
     if contacts.sliders is not None:
         whole = replace(whole, gap=whole.gap + contacts.sliders[:, :, None])
@@ -125,7 +126,7 @@ def contact_forces(
 
 
 def _of(gap_coefficients: FloatArray, contacts: IntArray) -> FloatArray:
-    """Return the (2H+1, 3 n) coefficients of some contacts; the array itself where these are all."""
+    """Return the (2H+1, 3 n) coefficients of some contacts; the array itself if these are all contacts."""
     m, width = gap_coefficients.shape
     if 3 * contacts.size == width:
         return gap_coefficients
@@ -177,7 +178,7 @@ def _planar(gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledCon
 
 
 def forces_between(events: Events, contacts: CompiledContacts, order: int) -> ContactPeriod:
-    """Return forces and derivatives up to `order` for a motion with fewer harmonics and known events, without samples.
+    """Return forces and derivatives up to `order` for a motion with fewer harmonics and known events, without sampling.
 
     Parameters
     ----------
@@ -186,7 +187,7 @@ def forces_between(events: Events, contacts: CompiledContacts, order: int) -> Co
     contacts
         The laws with which the events were found.
     order
-        Highest harmonic, at least that of the motion.
+        Highest harmonic, at least the highest one of the motion.
     """
     coefficients, blocks = integrated(events, contacts.elements, contacts.first, order, contacts.pairs)
     none = np.zeros((contacts.n_contacts, 3, 0))

@@ -32,7 +32,7 @@ from stickslip.harmonic.sparse_stiffness import SparseStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_form
 from stickslip.operators import Costs
 
-REDUCED = 300  # unknowns from which leaving out what rests can cost less than the whole array
+REDUCED = 300  # unknowns above which eliminating stuck contacts can cost less than solving the whole array
 
 JacobianForm = Literal["auto", "dense", "structured"]
 
@@ -64,10 +64,11 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class HarmonicBalance:
-    """The periodic problem of one structure, one interface and one load with some `harmonics`.
+    """The periodic problem of one structure, one interface and one load; build it with `harmonic_balance`.
 
-    The static term is always kept; ``m = 2 len(harmonics) - 1`` real coefficients a coordinate. Unknowns are ``q / displacement_scale``, equations are divided by `force_scale`, so that conditioning and steps do not depend on
-    units. Build it with `harmonic_balance`.
+    The static term is always kept: ``m = 2 len(harmonics) - 1`` real coefficients per coordinate. Unknowns are
+    ``q / displacement_scale`` and equations are divided by `force_scale`, so that conditioning and steps do not depend
+    on units.
     """
 
     linear: DynamicStiffness
@@ -92,7 +93,7 @@ class HarmonicBalance:
 
     @cached_property
     def n_rows(self) -> int:
-        """Real coefficients a coordinate."""
+        """Number of real coefficients per coordinate."""
         return 2 * len(self.harmonics) - 1
 
     @cached_property
@@ -102,7 +103,10 @@ class HarmonicBalance:
 
     @cached_property
     def structured(self) -> bool:
-        """Whether the Jacobian is given by its products; with the static term alone it is an array, unless nothing is condensed."""
+        """Whether the Jacobian is given by products with vectors.
+
+        With the static term alone it is an array, unless nothing is condensed.
+        """
         large = self.large if self.jacobian == "auto" else self.jacobian == "structured"
         return large and (self.order > 0 or isinstance(self.linear, SparseStiffness))
 
@@ -200,7 +204,10 @@ class HarmonicBalance:
         return self._with_forces(np.zeros((self.n_rows, self.linear.n)), contacts)
 
     def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
-        """Return the (size,) scaled residual from contacts with a known `period`, without condensed matrices if possible."""
+        """Return the (size,) scaled residual from contacts with a known `period`.
+
+        If possible, condensed matrices are not formed.
+        """
         direct = known_by_vectors(self.linear)
         if direct is None or self.large or self.structured:
             return self.linearise(x, omega, period).residual
@@ -257,7 +264,7 @@ class HarmonicBalance:
         return StructuredJacobian(part, blocks, self.rows, self.displacement_scale / self.force_scale)
 
     def _slope(self, x: FloatArray, omega: float, contacts: FloatArray | None) -> FloatArray:
-        """Return the (size,) derivative of the scaled residual by ω, from that of the contact forces."""
+        """Return the (size,) ω-derivative of the scaled residual, with the derivative `contacts` of the forces."""
         part = matrices(self.linear, self.harmonics, omega).condensed
         q = to_complex(x.reshape(self.n_rows, self.linear.n)) * self.displacement_scale
         slope = (part.derivative @ q[:, :, None])[..., 0] - part.load_derivative
@@ -266,7 +273,10 @@ class HarmonicBalance:
     def _by_products(
         self, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
-        """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
+        """Return linear forces, their ω-derivative and the Jacobian without condensed matrices.
+
+        The Jacobian stays in products if `structured`.
+        """
         part = products(self.linear, self.harmonics, omega)
         q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
@@ -288,7 +298,7 @@ class HarmonicBalance:
     def with_harmonics(self, harmonics: Harmonics) -> "HarmonicBalance":
         """Return the same problem with the `harmonics` of `harmonics_of`."""
         samples = _checked_samples(self.samples, harmonics[-1])
-        # rows of its own: they tell a solver which Jacobians can share a preconditioner
+        # a new `SparseRows` object: solvers share preconditioners between Jacobians with the same one
         return replace(self, harmonics=harmonics, samples=samples, rows=replace(self.rows))
 
 
@@ -329,7 +339,8 @@ def harmonic_balance(
     check_choice("harmonic_balance: jacobian", jacobian, get_args(JacobianForm), hint)
     check_retained("harmonic_balance", linear, interface)
     local = interface.restricted(linear.retained)
-    # a preload is no scale for the load: beside a large one the load's own equations would be solved coarsely
+    # the load sets the scale, not the preload: beside a large preload, the response to the load would be solved
+    # coarsely
     force_scale = linear.load.scale or float(np.max(np.abs(local.resting_force()), initial=0.0))
     if force_scale <= 0.0:
         raise input_error("HarmonicLoad", "is zero", "Give a static or a harmonic force.")
@@ -348,7 +359,7 @@ def harmonic_balance(
 
 
 def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
-    """Geometric mean of the contact stiffnesses; of the structure's diagonal where there is no contact."""
+    """Return the geometric mean of the contact stiffnesses, or of the structure's diagonal if there is no contact."""
     values = contact[contact > 0] if np.any(contact > 0) else np.abs(linear.nn[0].diagonal())
     values = values[values > 0]
     return float(np.exp(np.mean(np.log(values)))) if values.size else 1.0

@@ -1,8 +1,9 @@
-"""The periodic problem with extra unknowns and as many conditions: one equation ``F(y, p) = 0`` for the solvers of `stickslip.solve`.
+"""The periodic problem with extra unknowns and as many conditions.
 
-A resonance peak is a periodic motion whose frequency is unknown too and whose amplitude has a horizontal tangent; a motion of given amplitude
-has the level of the excitation as a further unknown. Each is a harmonic balance whose Jacobian gets a border: a column for each extra unknown
-and a row for each condition. Inside the border the Jacobian stays what it was, an array or known by its products.
+Together they are one equation ``F(y, p) = 0`` for the solvers of `stickslip.solve`. A resonance peak is a periodic
+motion with unknown frequency whose amplitude has a horizontal tangent; for a motion of given amplitude, the level of
+the excitation is unknown, too. The Jacobian of the harmonic balance gets a border: a column for each extra unknown and
+a row for each condition. Inside the border it stays an array or products, as before.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,7 @@ from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, difference
 from stickslip.operators import Bordered, Inverse, Jacobian
 
-WANDERED = 3.0  # |ln(ω / scale)| at which a corrector has lost what it was looking for
+WANDERED = 3.0  # |ln(ω / scale)| at which a corrector has left the solution it looks for
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,8 @@ class Setting:
     linear_alone
         Whether extra unknowns change only the linear forces of the balance.
     by_level
-        Derivative (size,) of the balance by the extra unknown other than the frequency, as a function of the state; None if unknown.
+        Function from a state to the (size,) derivative of the balance by the extra unknown other than the frequency;
+        None if unknown.
     """
 
     balance: HarmonicBalance
@@ -122,7 +124,7 @@ class State:
 
     @cached_property
     def _contacts(self) -> tuple[ContactPeriod, float]:
-        """Contacts over one period, and the time that they took."""
+        """Contacts over one period, and the time of their evaluation."""
         start = perf_counter()
         period = self.setting.balance.forces(self.x, self.setting.omega)
         return period, perf_counter() - start
@@ -137,12 +139,12 @@ class State:
         return np.stack(own, axis=1)
 
     def _by_level(self, place: int) -> FloatArray:
-        """Return the derivative of the balance by an extra unknown that is no frequency."""
+        """Return the derivative of the balance by an extra unknown other than the frequency."""
         known = self.setting.by_level
         return self.by_extra(place, State.changed_residual) if known is None else known(self)
 
     def changed_residual(self) -> FloatArray:
-        """Return the residual of the balance without the terms that extra unknowns do not change."""
+        """Return the part of the balance's residual that extra unknowns change."""
         balance, omega = self.setting.balance, self.setting.omega
         if self.setting.linear_alone:
             return balance.linear_residual(self.x, omega)
@@ -150,23 +152,29 @@ class State:
 
     @cached_property
     def inverse(self) -> Inverse | None:
-        """Solver of systems with ``[J, ∂r/∂z; row]``, z being the first extra unknown and `row` that of the problem; None if singular."""
+        """Solver of systems with ``[J, ∂r/∂z; row]``; None if singular.
+
+        z is the first extra unknown, and `row` the row of the problem.
+        """
         n = self.x.size
         row = np.eye(1, n + 1, n)[0] if self.problem.row is None else self.problem.row
         return self.problem.invert(Bordered(self.at.jac, self.columns[:, 0], row[:n], float(row[n])))
 
     @cached_property
     def along(self) -> FloatArray | None:
-        """(size + 1,) tangent of the motion and the first extra unknown, scaled so that its product with the row is 1; None if undetermined."""
+        """(size + 1,) tangent of the motion and the first extra unknown; None if undetermined.
+
+        Its product with the row is 1.
+        """
         n = self.x.size
         return None if self.inverse is None else self.inverse(np.eye(1, n + 1, n)[0])
 
     def moved(self, step: FloatArray) -> "State":
-        """Return the state a `step` (size + m,) away, for the same parameter."""
+        """Return the state after a `step` (size + m,), for the same parameter."""
         return self.problem.state(self.y + step, self.p)
 
     def by_extra(self, place: int, function: Callable[["State"], FloatArray]) -> FloatArray:
-        """Return the derivative of a function of states by one of the extra unknowns, a central difference."""
+        """Return the derivative of a function of states by an extra unknown, a central difference."""
         here = np.zeros(self.y.size)
         place += self.setting.balance.size
         here[place] = 1.0
@@ -221,7 +229,7 @@ class PeriodicProblem:
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """The equations at one state; derivatives are computed at first use, and so never for rejected trials.
+    """The equations at one state; derivatives are computed at first use, and thus never for rejected trials.
 
     Parameters
     ----------

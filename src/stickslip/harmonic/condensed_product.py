@@ -1,7 +1,7 @@
-"""Products of the condensed dynamic stiffness at one frequency, without forming it.
+"""Products of the condensed dynamic stiffness at one frequency with vectors, without forming the matrix.
 
-``Z_h q = D_NN q - D_NL D_LL⁻¹ D_LN q`` needs the structure's real matrices only, which all harmonics share, so that a frequency costs no
-condensation; one harmonic at a time is formed where it is to be factorised.
+``Z_h q = D_NN q - D_NL D_LL⁻¹ D_LN q`` needs only the real matrices of the structure, which all harmonics share, so
+that a new frequency costs no condensation. The matrix of a harmonic is formed only for its factorisation.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ Inner = ComplexArray | tuple[InnerOne, ...]  # an array: diagonals
 
 
 class Interiors(Protocol):
-    """Protocol of objects at one frequency with the dynamic stiffness of their interior."""
+    """Protocol of objects that have the dynamic stiffness of their interior at one frequency."""
 
     @property
     def omega(self) -> float: ...  # noqa: D102
@@ -82,7 +82,10 @@ class CondensedProduct:
         return at_frequency(self.linear.transposed, (near, inner), self.omega, self.harmonics)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, the conjugate of the product of Zᵀ and the conjugate."""
+        """Return the product of the `rows` with the transpose of the real form of Z.
+
+        It is the conjugate of Zᵀ times the conjugate of q.
+        """
         mirrored = rows.copy()
         mirrored[2::2] *= -1.0
         out = self.transposed.product(mirrored)
@@ -106,7 +109,10 @@ class CondensedProduct:
         return np.asarray(with_contacts(own, springs, rows))
 
     def mass_product(self, vectors: FloatArray) -> FloatArray:
-        """Return the mass times `vectors` (n, k), with the static response of the interior, whose stiffness is one."""
+        """Return the mass times `vectors` (n, k), condensed with the static response of the interior.
+
+        The interior modes have unit stiffness.
+        """
         k, _, m = self.linear.nl
         moved = k.T @ vectors
         inner = m.T @ vectors - self.linear.ll[2] @ moved
@@ -142,7 +148,7 @@ class CondensedProduct:
         """Return ``Z_h``, (n, n) complex in Fortran order."""
         s = harmonic * self.omega
         k, c, m = self.linear.nn
-        # symmetric: their transposes are in Fortran order
+        # the matrices are symmetric, and their transposes are in Fortran order
         out = np.empty(k.shape, dtype=complex, order="F")
         np.multiply(m.T, -(s**2), out=out.real)
         out.real += k.T
@@ -155,7 +161,7 @@ class CondensedProduct:
             return out
         onto = far if self.linear.ln is None else _across(self.linear.ln, loss, s)
         moved = _solve_one(self.inner[self.harmonics.index(harmonic)], onto.T)
-        # in place: for thousands of coordinates this is the largest array there is
+        # in place: with thousands of coordinates this is the largest array
         return np.asarray(scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True))
 
 
@@ -243,7 +249,7 @@ def _solve_one(inner: InnerOne, right: ComplexArray) -> ComplexArray:
 
 
 def _near(linear: Interior, rows: FloatArray) -> Lossy:
-    """Return the products of the retained coordinates' own matrices."""
+    """Return the products with the matrices of the retained coordinates."""
     k, c, m = linear.nn
     loss = None if linear.loss is None else rows @ linear.loss[0]
     return _products(rows, (k, c if linear.ln is None else c.T, m), linear.rayleigh, loss)
@@ -263,7 +269,10 @@ def _back(linear: Interior, rows: FloatArray) -> Lossy:
 
 
 def _products(rows: FloatArray, blocks: Blocks, shares: tuple[float, float] | None, loss: FloatArray | None) -> Lossy:
-    """Return the products with stiffness, damping and mass; that with the damping out of the others where it is made of them."""
+    """Return the products with stiffness, damping and mass.
+
+    With Rayleigh coefficients `shares`, the damping follows from the other two.
+    """
     k, c, m = blocks
     stiff, inert = rows @ k, rows @ m
     if shares is None:
@@ -273,7 +282,7 @@ def _products(rows: FloatArray, blocks: Blocks, shares: tuple[float, float] | No
 
 
 def _inner_parts(linear: Interior, rows: FloatArray) -> Lossy:
-    """Return the products of the interior's own matrices, for their slope: structural damping has none."""
+    """Return the products with the interior's matrices for the slope, which structural damping does not affect."""
     if linear.diagonal:
         k, c, m = (rows * np.diagonal(a) for a in linear.ll)
         return k, c, m, None
@@ -301,13 +310,13 @@ def dynamic_rows(parts: Lossy, s: FloatArray) -> FloatArray:
 
 
 def slope_rows(parts: Lossy, s: FloatArray) -> FloatArray:
-    """Return the derivative of `_dynamic` by s."""
+    """Return the derivative of `dynamic_rows` by s."""
     _, c, m, _ = parts
     return _turned(c) - 2.0 * s * m
 
 
 def _turned(rows: FloatArray) -> FloatArray:
-    """Multiply the complex coefficients ``C - iS`` that the `rows` stand for by i."""
+    """Return the `rows` of the complex coefficients ``C - iS`` after multiplication by i."""
     out = np.zeros_like(rows)
     out[1::2] = rows[2::2]
     out[2::2] = -rows[1::2]

@@ -1,28 +1,29 @@
-"""Estimated cost of the linear systems: with full matrices, and with products.
+"""Estimated cost of the linear systems, with full matrices and with products.
 
-The coefficients are seconds of one core, measured by the rows ``krylov/crossover`` of `evidence.benchmarks`. Where they are off by a common
-factor, as on a slower machine, nothing changes: they are compared with each other.
+The coefficients are seconds on one core, measured by the rows ``krylov/crossover`` of `evidence.benchmarks`. A common
+factor, as on a slower machine, does not matter, because costs are only compared with each other.
 """
 
 from stickslip.arrays import IntArray
 from stickslip.harmonic.matrix_products import MAX_SMALL_BLOCK
 from stickslip.operators import Costs
 
-# an array: a call, each entry, each entry times the unknowns
+# full array: per call, per entry, per entry and unknown
 ARRAY_CALL, ARRAY_ENTRY, ARRAY_FACTOR = 2e-5, 4.3e-9, 1.6e-11
-# a product: a call, each derivative of the contacts, each unknown
+# product: per call, per derivative of the contacts, per unknown
 PRODUCT_CALL, PRODUCT_CONTACT, PRODUCT_UNKNOWN = 9e-5, 2e-9, 1.4e-8
-# what a product takes of each entry of a harmonic's matrix, all harmonics in one compiled loop; or of each harmonic and each entry, one by one
+# product with the matrices of the harmonics: per entry in one compiled loop; or per harmonic and per entry, one by one
 LOOP_ENTRY = 5e-10
 CALL, CALL_ENTRY = 6e-5, 1.6e-9
-# new factors of a harmonic: a call, each entry, each entry times the coordinates; with inverses (no entries on their own), or without
+# factors of one harmonic: per call, per entry, per entry and coordinate; for inverses (no term per entry), and for LU
 INVERSE_CALL, INVERSE_FACTOR = 1.3e-4, 1.25e-9
 FACTORS_CALL, FACTORS_ENTRY, FACTORS_FACTOR = 8e-5, 3e-8, 5e-11
-# one real factor for all harmonics: each coordinate, for the low modes, each entry, each entry times the coordinates
+# one real factor for all harmonics: per coordinate (low modes), per entry, per entry and coordinate
 SHARED_COORDINATE, SHARED_ENTRY, SHARED_FACTOR = 8e-6, 4e-8, 1.6e-11
-# sparse matrices: what a product and new factors take of each entry of the stiffness, and of each harmonic
+# sparse matrices: product and factors, per entry of the stiffness and per harmonic
 SPARSE_PRODUCT, SPARSE_FACTORS = 2e-8, 3e-6
-# what rests: a call, each harmonic, each entry of its matrix, each entry times the coordinates; entries of matrices that nothing else needs
+# elimination of stuck contacts: per call, per harmonic, per entry, per entry and coordinate; per entry of matrices
+# formed only for it
 RESTING_CALL, RESTING_HARMONIC, RESTING_ENTRY, RESTING_FACTOR = 1.4e-4, 4e-5, 1.5e-8, 6e-11
 FORMED_ENTRY = 1.4e-8
 
@@ -67,7 +68,7 @@ def _array(unknowns: int) -> float:
 
 
 def products_pay(costs: Costs) -> bool:
-    """Whether a Jacobian is worth keeping by its products; the solver decides for each Jacobian."""
+    """Whether the Jacobian should be kept as products; the solver decides again for each Jacobian."""
     return costs.products_pay
 
 

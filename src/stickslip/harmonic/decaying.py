@@ -1,7 +1,8 @@
 """Dynamic stiffness of a decaying motion: ``D(s) = K + s C + s² M`` at ``s = hλ`` with ``λ = -β + iω``.
 
-A motion ``Re sum_h X_h e^{hλt}`` is the power series of one that decays as ``e^{λt}`` (Laxalde & Thouverez, Journal of Sound and Vibration 322 (2009)
-1009-1025). Its condensation is that of a steady motion at the complex frequency ``ω + iβ``; the mean feels the static stiffness.
+The motion is ``Re sum_h X_h e^{hλt}``, a power series of ``e^{λt}`` (Laxalde & Thouverez, Journal of Sound and
+Vibration 322 (2009) 1009-1025). Its condensation is the one of a steady motion at the complex frequency ``ω + iβ``; the
+mean has the static stiffness.
 """
 
 from dataclasses import dataclass, replace

@@ -1,8 +1,9 @@
 """Rigid contacts in harmonic balance: the dynamic Lagrangian frequency-time method (Nacivet et al. 2003).
 
-The forces of rigid contacts are what equilibrium asks for, ``Λ = F - Z q`` along a gap. Added to a penalty ``ε`` times what the law
-forbids, sliding or penetration, they predict a force in the time domain that Coulomb's and Signorini's laws correct. At a solution the
-correction returns Λ, whatever ε is: a penalty of the method, not a stiffness of the contact.
+The force of a rigid contact along a gap follows from equilibrium, ``Λ = F - Z q``. Plus a penalty ``ε`` on the
+forbidden motion, sliding or penetration, it is a predicted force, which Coulomb's and Signorini's laws correct in the
+time domain. At a solution the correction returns Λ, whatever ε is: ε is a penalty of the method, not a contact
+stiffness.
 """
 
 import math
@@ -27,9 +28,9 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
 from stickslip.harmonic.rigid_jacobian import GapLaws, RigidJacobian, RigidLinearisation, derivative
 
-LOSS = 1e-13  # of the largest stiffness, as good as none
-MIN_MEAN_HARMONICS = 5  # harmonics over which the mean is taken: with one alone a resonance would rule it
-SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
+LOSS = 1e-13  # relative to the largest stiffness, negligible
+MIN_MEAN_HARMONICS = 5  # harmonics in the mean at least: with only one, a resonance would dominate it
+SAMPLES_OF_OTHERS = 8  # per harmonic, at least, for contacts with stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,12 @@ class Penalty:
 
 @lru_cache(maxsize=4)
 def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penalty:
-    """Return the geometric mean over the harmonics of ``1 / (h |H(hω)|)``, H being the compliance seen by a force along a coordinate.
+    """Return the geometric mean over the harmonics of ``1 / (h |H(hω)|)``.
 
-    The velocity by τ = ωt has h times the amplitude of the displacement: with this penalty, sliding causes the force with which the structure
-    would respond. The penalty does not depend on the coordinates of the structure, and changes smoothly with ω.
-    The geometric mean of h is replaced by its limit (order + 1) / e: logarithms of the order would spoil an extrapolation in the order.
+    H is the compliance seen by a force along a coordinate. The velocity by τ = ωt has h times the amplitude of the
+    displacement, so that with this penalty sliding predicts the force with which the structure would respond. The
+    penalty does not depend on the choice of coordinates, and changes smoothly with ω. The geometric mean of h is
+    replaced by its limit (order + 1) / e, because logarithms of the order would spoil an extrapolation in the order.
 
     Parameters
     ----------
@@ -62,7 +64,7 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     h = np.arange(1, highest + 1)
     stiffness = part.stiffness[h]
     largest = float(np.max(np.abs(np.diagonal(stiffness, axis1=1, axis2=2))))
-    # without damping a harmonic may meet a resonance exactly, where there is no inverse
+    # without damping a harmonic may hit a resonance exactly, and there is no inverse
     inverse = np.linalg.inv(stiffness + 1j * LOSS * largest * np.eye(linear.n))
     compliance = np.diagonal(inverse, axis1=1, axis2=2)
     slope = -np.sum((inverse @ part.derivative[h]) * inverse.swapaxes(1, 2), axis=2)
@@ -100,7 +102,7 @@ class DynamicLagrangian:
 
     @cached_property
     def springs(self) -> Interface:
-        """The interface with springs, stiff ones for rigid contacts: the contacts where none slips or opens."""
+        """The interface with all contacts stuck, rigid ones replaced by stiff springs."""
         stiffness = np.abs(np.diagonal(self.linear.nn[0]))[self.interface.coordinates()]
         return self.interface.sprung(STIFF * float(stiffness.max()))
 
@@ -187,7 +189,7 @@ class DynamicLagrangian:
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
         """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s).
 
-        Gaps are those of the motion, without initial gaps. For rigid contacts the blocks are derivatives by predicted forces.
+        The gaps do not include initial gaps. For rigid contacts the blocks are derivatives by predicted forces.
         """
         balance, rigid = self.balance, self.rigid
         found = self._corrected(x, omega, balance.linearise(x, omega).residual)
@@ -248,9 +250,9 @@ class DynamicLagrangian:
 class _Corrected:
     period: RigidPeriod
     coefficients: FloatArray  # (m, n_rigid, 3)
-    stuck: BoolArray  # (n_gaps,) tangents that stick throughout
+    stuck: BoolArray  # (n_gaps,) tangents that stick throughout the period
     penalty: Penalty
-    forbidden: FloatArray  # (m, n_gaps) penalty times what the laws forbid
+    forbidden: FloatArray  # (m, n_gaps) penalty times the forbidden motion
 
 
 def _in_time(coefficients: FloatArray, samples: int) -> FloatArray:
@@ -272,10 +274,10 @@ def _basis(order: int, samples: int) -> FloatArray:
 
 
 def _hold(period: RigidPeriod, held: FloatArray, stuck: BoolArray, rigid: RigidContacts) -> None:
-    """Fill in, for tangents that stick throughout, the force of a slider that starts at zero displacement.
+    """Fill in, for tangents that stick throughout the period, the force of a slider that starts at zero displacement.
 
-    Where nothing ever slides, sliding velocities say nothing of the place of the contact. A spring of stiffness ε on the predicted
-    displacement does: unstretched at zero, or dragged along as far as a first period had to slip.
+    If a contact never slides, sliding velocities do not determine its position. A spring of stiffness ε on the
+    predicted displacement does: it is unstretched at zero, or dragged as far as the contact slips in a first period.
     """
     m = held.shape[0]
     which = np.unique(rigid.contact[stuck])
@@ -290,14 +292,17 @@ def _hold(period: RigidPeriod, held: FloatArray, stuck: BoolArray, rigid: RigidC
 
 
 def _slider(mu: float, constant: float) -> ElasticCoulomb:
-    """Return the contact with unit springs, for gaps that are written as forces."""
+    """Return an elastic Coulomb contact with unit springs, for gaps given as forces."""
     if np.isnan(constant):
         return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=mu)
     return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=mu, preload=constant)
 
 
 def _gap_laws(rigid: RigidContacts, found: _Corrected) -> GapLaws:
-    """Return the derivatives of the corrected forces by gap; penalties are on displacements along the normal and where a tangent is held."""
+    """Return the derivatives of the corrected forces by gap.
+
+    The penalty acts on the displacement of normal gaps and of tangents that stick throughout.
+    """
     blocks, along = found.period.blocks, rigid.direction == NORMAL
     pairs = (rigid.contact[:, None] == rigid.contact) & ~along[:, None] & along
     tangent, normal = np.nonzero(pairs)
@@ -321,20 +326,21 @@ def dynamic_lagrangian(
     penalty: float | None = None,
     evaluator: Evaluator = "intervals",
 ) -> DynamicLagrangian:
-    """Set up the periodic problem of an interface in which contacts are rigid (`RigidCoulomb`), all or some.
+    """Set up the periodic problem of an interface with rigid contacts (`RigidCoulomb`), all or some.
 
     Parameters
     ----------
     linear
         Condensed structure and load.
     interface
-        Contacts on the dofs of the whole structure; each gap of a rigid contact must be a factor times a retained coordinate.
+        Contacts on the dofs of the whole structure; each gap of a rigid contact must be a factor times a retained
+        coordinate.
     order
         Highest harmonic.
     samples
-        Samples per period. With ``2 order + 1``, as many as there are coefficients, the laws hold exactly at the samples, and the solution
-        does not depend on the penalty. With eight a harmonic and more, the solution is more accurate, and its dependence on the penalty is
-        smaller than the error by missing harmonics.
+        Samples per period. With ``2 order + 1``, as many as there are coefficients, the laws hold exactly at the
+        samples, and the solution does not depend on the penalty. With eight or more per harmonic, the solution is more
+        accurate, and depends on the penalty less than on missing harmonics.
     penalty
         Penalty ε of the method (N/m); None: the dynamic stiffness of the structure at each gap, see `dynamic_penalty`.
     evaluator
@@ -343,7 +349,8 @@ def dynamic_lagrangian(
     Raises
     ------
     InputError
-        If no contact is rigid, a gap of a rigid contact is no coordinate, or there are fewer samples than coefficients.
+        If no contact is rigid, a gap of a rigid contact is not a coordinate, or there are fewer samples than
+        coefficients.
     """
     rigid = np.array([i for i, law in enumerate(interface.laws) if isinstance(law, Rigid)], dtype=np.int64)
     if not rigid.size:

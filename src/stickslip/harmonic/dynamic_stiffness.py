@@ -1,9 +1,9 @@
 """Dynamic stiffness condensed exactly to the retained coordinates (Gastaldi & Berruti 2017, eq. 2-5).
 
-``D(Ω) = K + iΩ C - Ω² M``, with ``K + iL`` for K above harmonic 0 where there is structural damping. The interior is written once in its own undamped modes, and where these do not diagonalise the damping in
-its state-space eigenvectors; a frequency then costs a few products and no factorisation (`harmonic.spectral`). Only where those
-eigenvectors are ill-conditioned, the interior is very large, or structural damping makes its stiffness complex, is it solved at each
-frequency.
+``D(Ω) = K + iΩ C - Ω² M``; structural damping L adds ``iL`` above harmonic 0. The interior is transformed once to its
+undamped modes or, if these do not diagonalise the damping, to its state-space eigenvectors. Each frequency then costs a
+few products and no factorisation (`harmonic.spectral`). The interior is solved at each frequency only if the
+eigenvectors are ill-conditioned, the interior is very large, or structural damping makes its stiffness complex.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
 from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 
-DIAGONAL_TOLERANCE = 1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
+DIAGONAL_TOLERANCE = 1e-10  # largest share of off-diagonal modal damping that still counts as proportional
 LARGEST_INTERIOR = 5000  # dense eigenproblem of the interior; reduce larger structures first
 
 
@@ -54,10 +54,10 @@ class _Sums:
 
 @dataclass(frozen=True, eq=False)
 class CondensedStiffness:
-    """A structure and its load, seen from the retained coordinates.
+    """A structure and its load, condensed to the retained coordinates; build it with `condense`.
 
-    Build it with `condense`. Retained blocks carry ``n``, interior ones ``l``, in undamped modes of unit stiffness. Only damping may lack
-    symmetry, by Coriolis forces.
+    Retained blocks have the index ``n``, interior ones ``l``; the interior is in undamped modes of unit stiffness. Only
+    the damping may lack symmetry, by Coriolis forces.
     """
 
     retained: IntArray
@@ -68,8 +68,8 @@ class CondensedStiffness:
     modes: FloatArray  # interior displacement = modes @ interior coordinates
     diagonal: bool
     load: HarmonicLoad
-    spectral: Interior  # the same blocks, and what is derived from them when first needed
-    ln: Blocks | None = None  # transposes of the blocks that lead back, where damping is not symmetric
+    spectral: Interior  # the same blocks, with decompositions that are computed at first use
+    ln: Blocks | None = None  # transposed blocks from retained coordinates to interior, if damping is not symmetric
     loss: Blocks | None = None  # structural damping on nn, nl, ll
 
     @cached_property
@@ -79,7 +79,7 @@ class CondensedStiffness:
 
     @property
     def most(self) -> None:
-        """Highest harmonic for which there are matrices: any."""
+        """Highest available harmonic; None: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
         """Return the load, N, which is the same at all frequencies."""
@@ -98,7 +98,7 @@ class CondensedStiffness:
 
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
-        # the static problem alone is no reason to decompose the interior
+        # the static problem alone does not justify decomposing the interior
         sums = self._sums if order > 0 and omega != 0.0 else None
         return self._factorised(omega, order) if sums is None else self._summed(sums, omega, order)
 
@@ -180,7 +180,7 @@ class CondensedStiffness:
         """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
         inner = self._inside(omega, q, self.modal_loads(q.shape[0] - 1)[1])
         outer = np.sum(q.conj() * (q @ self.nn[0].T + 2.0 * inner @ self.nl[0].T), axis=1).real
-        # the interior's modes have unit stiffness
+        # interior modes have unit stiffness
         share = 0.25 + 0.25 * (np.arange(len(q)) == 0)
         return np.asarray(share * (outer + np.sum(np.abs(inner) ** 2, axis=1)))
 
@@ -216,7 +216,7 @@ class CondensedStiffness:
 
     @cached_property
     def _modal_load(self) -> tuple[ComplexArray, ComplexArray]:
-        """Load on the retained coordinates and on the interior's modes, as many harmonics as it has."""
+        """Load on the retained coordinates and on the interior's modes, for the harmonics of the load."""
         f = self.load.coefficients(max(self.load.harmonics, default=0))
         inner = f[:, self.interior]
         return f[:, self.retained], inner.real @ self.modes + 1j * (inner.imag @ self.modes)
@@ -231,7 +231,7 @@ class CondensedStiffness:
         return _Sums(terms, f_n - f_l @ self.nl[0].T, terms.source(f_l), direct)
 
     def _interior_dynamic(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""
+        """Return interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""
         loss = None if self.loss is None else self.loss[2]
         if self.diagonal:
             k, c, m = (np.diagonal(a)[None, :, None] for a in self.ll)
@@ -314,7 +314,7 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
 
 
 def _loss(structure: Structure, retained: IntArray, interior: IntArray, modes: FloatArray) -> Blocks | None:
-    """Return structural damping on the retained coordinates, across, and on the interior's modes; None where there is none."""
+    """Return the blocks nn, nl and ll of the structural damping, the interior in its modes; None if there is none."""
     if structure.loss is None:
         return None
     matrix = real_symmetric(structure, "loss")
@@ -325,7 +325,7 @@ def _loss(structure: Structure, retained: IntArray, interior: IntArray, modes: F
 
 
 def _checked_dofs(retained: IntArray, n: int) -> IntArray:
-    """Return dof indices after checking that each is there, once."""
+    """Return dof indices after checking that they exist and differ."""
     dofs = np.asarray(retained)
     whole = dofs.size == 0 or np.issubdtype(dofs.dtype, np.integer)
     if not whole or dofs.ndim != 1 or np.any((dofs < 0) | (dofs >= n)) or np.unique(dofs).size != dofs.size:
@@ -349,7 +349,10 @@ def _modal(modes: FloatArray, mass: FloatArray, damping: FloatArray) -> Blocks:
 
 
 def _interior_modes(stiffness: FloatArray, mass: FloatArray) -> FloatArray:
-    """Return the undamped modes, of unit stiffness: those without mass are modes as well, and the slow ones come out sharpest."""
+    """Return the undamped modes of unit stiffness.
+
+    With this scaling massless modes are regular, and slow modes are the most accurate.
+    """
     if stiffness.shape[0] == 0:
         return np.eye(0)
     size = np.sqrt(np.maximum(np.abs(np.diagonal(stiffness)), np.finfo(float).tiny))

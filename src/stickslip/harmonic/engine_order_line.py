@@ -14,17 +14,17 @@ from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.travelling import condense_side
 from stickslip.reduction.speed_line import SpeedLine
 
-STEP = 1e-6  # of the speed, for the derivative that gives a branch its direction
-REMEMBERED = 8  # frequencies whose condensation is kept
-PARALLEL = 1e-9  # of a load, that may differ from a multiple of the line's own
+STEP = 1e-6  # relative step of the speed for the derivative, which only sets the direction of a branch
+REMEMBERED = 8  # frequencies whose condensation is cached
+PARALLEL = 1e-9  # largest relative deviation of a load from a multiple of the line's load
 
 
 @dataclass(frozen=True, eq=False)
 class TurningStiffness:
-    """A structure or wheel and its load along an engine-order line, seen from the retained coordinates; `condense_line` makes one.
+    """A structure or wheel and its load along an engine-order line; build it with `condense_line`.
 
-    All values belong to the speed ``ω / m``. Derivatives by ω include the derivative of the matrices by the speed, a finite difference: they
-    determine the direction of branches, but no solution.
+    All values are taken at the speed ``ω / m``. Derivatives by ω include the derivative of the matrices by the speed, a
+    finite difference: they determine the direction of branches, but no solution.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class TurningStiffness:
     factors
         Harmonic -> factor on the load of the line.
     rate
-        Rate, 1/s, times which the mass is added to the damping.
+        Rate of a mass-proportional damping, 1/s, which is added to the damping.
     """
 
     line: SpeedLine
@@ -54,7 +54,7 @@ class TurningStiffness:
 
     @property
     def most(self) -> int | None:
-        """Highest harmonic for which there are matrices; None: any."""
+        """Highest available harmonic; None: any."""
         return self._at_speed(float(self.line.speeds[-1])).most
 
     @property
@@ -72,12 +72,12 @@ class TurningStiffness:
         return self._load(self.line.speed(omega))
 
     def with_load(self, load: HarmonicLoad) -> "TurningStiffness":
-        """Return the same structure under multiples of its loads.
+        """Return the same structure with each load of the line scaled to `load`.
 
         Raises
         ------
         InputError
-            If a load is no multiple of the line's load at the highest speed.
+            If a load is not a multiple of the line's load at the highest speed.
         """
         top = float(self.line.speeds[-1])
         given = {0: load.static.astype(complex), **load.harmonics}
@@ -121,7 +121,7 @@ class TurningStiffness:
         return self.at(omega).strain_energy(omega, q)
 
     def at(self, omega: float) -> DynamicStiffness:
-        """Return the dynamic stiffness at the speed that belongs to a frequency, with its load."""
+        """Return the dynamic stiffness at the speed of a frequency, with its load."""
         return self._at_speed(self.line.speed(omega))
 
     def beside(self, omega: float) -> DynamicStiffness:
@@ -144,7 +144,7 @@ class TurningStiffness:
 
 @dataclass(frozen=True, eq=False)
 class TurningProducts:
-    """The condensed matrices of one speed by their products, with the derivative by the speed."""
+    """The condensed matrices at one speed as products with vectors, with derivatives along the line."""
 
     here: Products
     linear: TurningStiffness
@@ -195,7 +195,7 @@ class TurningProducts:
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order, as a copy."""
-        block: ComplexArray = self.here.block(harmonic)  # what turns is condensed
+        block: ComplexArray = self.here.block(harmonic)  # never sparse: a side along a line is condensed
         return block
 
     def _there(self) -> Products:
@@ -210,13 +210,16 @@ def condensed(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: i
 
 
 def condense_line(line: SpeedLine, retained: IntArray, load: HarmonicLoad, order: int) -> TurningStiffness:
-    """Prepare the exact condensation along an engine-order line; `load` holds multiples of the line's own at the highest speed."""
+    """Prepare the exact condensation along an engine-order line.
+
+    The `load` contains multiples of the line's loads at the highest speed.
+    """
     one = TurningStiffness(line, np.asarray(retained, dtype=np.int64), order, {})
     return one.with_load(load)
 
 
 def _factor(own: ComplexArray, given: ComplexArray | None) -> complex:
-    """Return the factor by which a load is a multiple of the line's own."""
+    """Return the factor between a load and the line's load."""
     if given is None or not np.any(given):
         return 0.0
     size = float(np.vdot(own, own).real)

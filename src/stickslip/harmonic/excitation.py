@@ -24,7 +24,7 @@ class HarmonicLoad:
     Raises
     ------
     InputError
-        If an order is no integer above 0, lengths differ, the static load is complex or a force is not finite.
+        If an order is not a positive integer, lengths differ, the static load is complex or a force is not finite.
     """
 
     static: FloatArray
@@ -69,7 +69,7 @@ class HarmonicLoad:
         return out
 
     def over_periods(self, periods: int) -> "HarmonicLoad":
-        """Return the same load with `periods` times the period, at ω / periods, for subharmonic motions."""
+        """Return the same load as harmonics of ω / periods, for subharmonic motions with `periods` times the period."""
         return HarmonicLoad(self.static, {periods * h: f for h, f in self.harmonics.items()})
 
     @property

@@ -1,7 +1,8 @@
-"""LU factors that are solved with many times, one right side at a time.
+"""LU factors for many solutions with one right side at a time.
 
-LAPACK's triangular solves work through single columns. Here the diagonal blocks of both triangles are inverted once, so that a solve
-consists of products of blocks with vectors and is as fast as memory delivers the factors. Sparse matrices have SuperLU's factors.
+LAPACK's triangular solves work through single columns. Here the diagonal blocks of both triangles are inverted once, so
+that a solution consists of products of blocks with vectors, limited only by memory bandwidth. Sparse matrices have
+SuperLU's factors.
 """
 
 from dataclasses import dataclass
@@ -16,10 +17,10 @@ from stickslip.contact.interface import SparseRows
 from stickslip.contact.product import add_stiffness
 from stickslip.errors import input_error
 
-SINGULAR = 5.0  # roundings; smallest pivot over largest below which a matrix has no usable factors
+SINGULAR = 5.0  # times rounding: ratio of smallest to largest pivot below which factors are unusable
 BLOCK = 64  # rows; blocks half or twice as large cost up to a tenth more
-PIVOTS = 0.01  # a sparse factorisation leaves the diagonal for a pivot more than a hundred times as large
-LARGEST_ARRAY = 4000  # rows of a sparse matrix that is made an array
+PIVOTS = 0.01  # a sparse factorisation leaves the diagonal only for a pivot a hundred times as large
+LARGEST_ARRAY = 4000  # rows, largest sparse matrix that is converted to an array
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,10 @@ AnyFactors = Factors | SparseFactors
 
 
 def factorise(matrix: Matrix) -> AnyFactors | None:
-    """Factorise a (n, n) matrix, sparse or an array, which is overwritten (Fortran order is fastest); None if it is singular to its precision."""
+    """Factorise a (n, n) matrix; None if it is singular to its precision.
+
+    The matrix is sparse or an array; an array is overwritten, fastest in Fortran order.
+    """
     return _sparse(matrix) if scipy.sparse.issparse(matrix) else _dense(matrix)
 
 
@@ -127,7 +131,7 @@ def _dense(matrix: FloatArray | ComplexArray) -> Factors | None:
     lower, upper = [], []
     for first in range(0, size.size, BLOCK):
         block = lu[first : first + BLOCK, first : first + BLOCK]
-        # LAPACK takes the diagonal of the lower triangle for ones and leaves the other triangle in place
+        # LAPACK ignores the diagonal of the lower triangle, which is one, and does not touch the other triangle
         below = np.tril(invert(block, lower=1, unitdiag=1)[0], -1)
         lower.append(below + np.eye(len(below), dtype=below.dtype))
         upper.append(np.triu(invert(block)[0]))
@@ -135,7 +139,7 @@ def _dense(matrix: FloatArray | ComplexArray) -> Factors | None:
 
 
 def _row_order(pivots: IntArray) -> IntArray:
-    """Turn LAPACK's successive swaps of rows into one order of them."""
+    """Convert LAPACK's successive row swaps into one order of the rows."""
     order = np.arange(pivots.size)
     for row, other in enumerate(pivots):
         order[row], order[other] = order[other], order[row]

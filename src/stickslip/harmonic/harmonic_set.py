@@ -1,6 +1,7 @@
-"""Harmonic supports: which harmonics a periodic motion keeps, where their real coefficients stand, and the complex ones in their place.
+"""Sets of harmonics of a periodic motion (supports), and conversion between real and complex Fourier coefficients.
 
-``q(t) = Re sum_h Q_h exp(i h ω t)``, ``Q_h = C_h - i S_h``; the real vector is harmonic-major: ``[Q_0, C_1, S_1, ...]``, no factor 1/2.
+``q(t) = Re sum_h Q_h exp(i h ω t)``, ``Q_h = C_h - i S_h``; the real vector is harmonic-major:
+``[Q_0, C_1, S_1, ...]``, no factor 1/2.
 """
 
 import math
@@ -11,24 +12,24 @@ import numpy as np
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 
-Harmonics = tuple[int, ...]  # growing, from 0: the static term is always kept
-ByDof = tuple[Harmonics, ...]  # one support a coordinate
+Harmonics = tuple[int, ...]  # ascending from 0: the static term is always kept
+ByDof = tuple[Harmonics, ...]  # one support per coordinate
 
 
 def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmonics:
-    """Return a set of harmonics (support) from the highest one, or from a list such as 1, 3, 5.
+    """Return a set of harmonics (support) from its highest harmonic, or from a list such as 1, 3, 5.
 
     Parameters
     ----------
     chosen
-        Highest harmonic, all lower ones being kept, or a list of harmonics; the static term is added.
+        Highest harmonic of a full set, or a list of harmonics, to which the static term is added.
     place
         Place, for messages.
 
     Raises
     ------
     InputError
-        If an entry is no integer, or is negative.
+        If an entry is not an integer, or is negative.
     """
     try:
         given = range(chosen + 1) if isinstance(chosen, (int, np.integer)) else tuple(chosen)
@@ -45,13 +46,16 @@ def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmo
 
 
 def multiples(harmonics: Iterable[int], highest: int) -> Harmonics:
-    """Return the multiples, from 0 up to `highest`, of the common divisor of `harmonics`: a motion of these excites no others."""
+    """Return the multiples, from 0 to `highest`, of the common divisor of `harmonics`.
+
+    A motion with these harmonics excites no others.
+    """
     step = math.gcd(*harmonics) or 1
     return tuple(range(0, highest + 1, step))
 
 
 def named(harmonics: Iterable[int]) -> str:
-    """Return a support as text: ``5`` if it has all up to the fifth, else ``1, 3, 5``."""
+    """Return a support as text: ``5`` if it is full up to the fifth harmonic, else ``1, 3, 5``."""
     own = [int(h) for h in harmonics if h > 0]
     if own == list(range(1, len(own) + 1)):
         return str(len(own))
@@ -70,14 +74,17 @@ def rows_of(harmonics: Harmonics) -> IntArray:
 
 
 def rows_among(harmonics: Harmonics, some: Iterable[int]) -> IntArray:
-    """Return the positions of the real coefficients of `some` harmonics among those of a support that contains them."""
+    """Return the positions of the real coefficients of `some` harmonics within a support that contains them."""
     chosen = set(some)
     wanted = rows_of((0, *sorted(h for h in chosen if h > 0)))[0 if 0 in chosen else 1 :]
     return np.searchsorted(rows_of(harmonics), wanted)
 
 
 def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
-    """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros for missing harmonics."""
+    """Return the (2 len(harmonics) - 1, ...) real rows of a support from complex `coefficients` (H+1, ...).
+
+    Missing harmonics are zero.
+    """
     whole = coefficients if len(coefficients) == harmonics[-1] + 1 else padded(coefficients, harmonics[-1])
     return to_real(whole if is_full(harmonics) else whole[list(harmonics)])
 
@@ -93,22 +100,22 @@ def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:
 
 
 def of_all(by_dof: ByDof) -> Harmonics:
-    """Return the harmonics of all coordinates together."""
+    """Return the union of the harmonics of all coordinates."""
     return tuple(sorted({h for own in by_dof for h in own}))
 
 
 def joined(one: ByDof, other: ByDof) -> ByDof:
-    """Return for each coordinate the harmonics of either of two sets."""
+    """Return for each coordinate the union of its harmonics in two sets."""
     return tuple(tuple(sorted({*a, *b})) for a, b in zip(one, other, strict=True))
 
 
 def kept_by_dof(by_dof: ByDof, harmonics: Harmonics) -> BoolArray:
-    """Return the (len(harmonics), n) pairs of harmonic and coordinate that are kept."""
+    """Return whether each pair of harmonic and coordinate is kept, (len(harmonics), n)."""
     return np.array([[h in own for own in by_dof] for h in harmonics], dtype=bool)
 
 
 def supports_of(kept: BoolArray, harmonics: Harmonics) -> ByDof:
-    """Return the support of each coordinate from the (len(harmonics), n) pairs that are kept."""
+    """Return the support of each coordinate from the (len(harmonics), n) kept pairs of harmonic and coordinate."""
     return tuple(tuple(h for h, own in zip(harmonics, column, strict=True) if own) for column in kept.T)
 
 

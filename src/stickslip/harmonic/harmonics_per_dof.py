@@ -1,8 +1,8 @@
-"""Harmonic balance in which each coordinate keeps harmonics of its own.
+"""Harmonic balance in which each coordinate has its own set of harmonics.
 
-With the coordinates' own harmonics ``S_i`` the motion is ``x = P y``, ``P`` the columns of the unit matrix that belong to kept pairs
-of harmonic and coordinate, and Galerkin's equations are ``Pᵀ r(P y) = 0``: what a coordinate does not have is zero, and the
-equilibrium of that harmonic at that coordinate is not asked for.
+With ``P`` the columns of the unit matrix for the kept pairs of harmonic and coordinate, the motion is ``x = P y`` and
+Galerkin's equations are ``Pᵀ r(P y) = 0``. Harmonics that a coordinate does not keep are zero, and their equilibrium at
+this coordinate is not enforced.
 """
 
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ class LocalBalance:
 
     @property
     def harmonics(self) -> Harmonics:
-        """Harmonics of all coordinates together."""
+        """Union of the harmonics of all coordinates."""
         return self.balance.harmonics
 
     @property
@@ -63,7 +63,7 @@ class LocalBalance:
 
     @property
     def rows(self) -> SparseRows:
-        """Gap operator by contact."""
+        """Gap operator, sorted by contact."""
         return self.balance.rows
 
     @property

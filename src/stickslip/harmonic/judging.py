@@ -1,10 +1,11 @@
-"""The harmonics against which a solution is judged: all multiples of their common divisor up to three times the highest, and resonant ones above.
+"""The harmonics against which a solution is judged (judging set).
 
-A force that is odd in one harmonic h answers in 3 h, one that is even in 2 h and in the mean; a product of two harmonics in their sum and their
-difference. All of these are in the set, and so are all harmonics between them, where a mode may amplify a small force. A contact may see one kept
-harmonic alone, by its place in the shape or by the wave of a wheel. A solution is exact if nothing acts on any harmonic of this set; no smaller
-set, and no name of a law, proves it. Beyond the set, a small contact force may cause a large motion where it meets a mode: `ringing` finds these
-harmonics.
+The set consists of the multiples of the common divisor up to three times the highest harmonic. An odd force in harmonic
+h excites 3 h, an even one 2 h and the mean, and a product of two harmonics their sum and difference. The set contains
+all of these, and all harmonics between them, where a mode may amplify a small force. A contact may respond to a single
+kept harmonic, because of its position in the mode shape or the wave number of a wheel. A solution is exact if no force
+acts on any harmonic of this set; no smaller set, and no property of a contact law, proves it. Beyond the set, a small
+contact force may cause a large motion at a resonance; `ringing` finds these harmonics.
 """
 
 from collections.abc import Iterable
@@ -24,14 +25,14 @@ from stickslip.harmonic.matrix_products import products
 from stickslip.harmonic.sparse_stiffness import SparseProduct
 
 JUDGED_MULTIPLE = 3  # highest harmonic of a judging set over the highest that is kept or driven
-HIGHEST = 63  # harmonic, in multiples of the common divisor, beyond which nothing is looked for: there a motion in time costs less
-SAMPLES_A_HARMONIC = 8  # of the contact forces at least: with fewer, aliasing may hide what acts
-# error of a solution that is not known to be exact, and that a prediction leaves as it is: `exact` is 0, and nothing else is
+HIGHEST = 63  # harmonic, in multiples of the common divisor, up to which resonances are searched: beyond, time integration costs less
+SAMPLES_A_HARMONIC = 8  # of the contact forces, at least: with fewer, aliasing may hide a force
+# error of a solution that is not proved exact, although its prediction is zero; only exact solutions have the error 0
 UNSEEN = float(np.finfo(float).tiny)
 
 
 def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
-    """Return all multiples, 0 among them, of the common divisor of all kept and excited harmonics, up to three times the largest.
+    """Return the multiples of the common divisor of all kept and excited harmonics, from 0 to three times the largest.
 
     Parameters
     ----------
@@ -45,9 +46,10 @@ def judging_set(kept: Iterable[int], driven: Iterable[int] = ()) -> Harmonics:
 
 
 def judging_indices(driven: Iterable[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
-    """Return the combined frequencies j ω1 + k ω2 that a nonlinear force first excites from the driven ones: 2a, 3a, a ± b, 2a ± b and a ± 2b of any a and b.
+    """Return the combined frequencies j ω1 + k ω2 that a nonlinear force excites first.
 
-    Only one of (j, k) and (−j, −k) is returned, as in `half_plane`; (0, 0) is left out.
+    For any driven a and b these are 2a, 3a, a ± b, 2a ± b and a ± 2b. Only one of (j, k) and (−j, −k) is returned, as
+    in `half_plane`; (0, 0) is left out.
     """
     own = sorted({*driven} - {(0, 0)})
     fed: set[tuple[int, int]] = set(own)
@@ -64,14 +66,14 @@ def driven_by(load: HarmonicLoad) -> Harmonics:
 
 
 def judging_set_of(low: HarmonicBalance) -> Harmonics:
-    """Return the judging set of a periodic problem, from its kept harmonics and those of its load."""
+    """Return the judging set of a periodic problem, from its kept harmonics and the harmonics of its load."""
     return judging_set(low.harmonics, driven_by(low.linear.load))
 
 
 def judging_balance(low: HarmonicBalance, also: Iterable[int] = ()) -> HarmonicBalance:
     """Return the same problem with the harmonics of its judging set, and enough samples for them.
 
-    A wheel that was condensed for fewer harmonics keeps those; then `covers` is False.
+    A wheel that was condensed for fewer harmonics is limited to these; then `covers` is False.
 
     Parameters
     ----------
@@ -87,21 +89,24 @@ def judging_balance(low: HarmonicBalance, also: Iterable[int] = ()) -> HarmonicB
 
 
 def covers(low: HarmonicBalance, high: HarmonicBalance) -> bool:
-    """Whether `high` contains the judging set of `low`: only then a solution of `low` without forces on its other harmonics is exact."""
+    """Whether `high` contains the judging set of `low`.
+
+    Only then is a solution of `low` exact if no force acts on the other harmonics of `high`.
+    """
     return set(judging_set_of(low)) <= set(high.harmonics)
 
 
-MAX_RINGING = 4  # harmonics, those with the largest gaps
-FAINTEST_GAP = 1e-4  # of the vibration of the gaps, below which nothing is made of it
-MAX_RINGING_ROWS = 400  # of a structure, above which its matrices are not solved with for each harmonic
-MAX_STACKED_ROWS = 100  # of matrices that are solved with in one call: 60 harmonics of them take 10 MB
+MAX_RINGING = 4  # harmonics with the largest gaps that are returned
+FAINTEST_GAP = 1e-4  # relative to the vibration of the gaps; smaller ones are ignored
+MAX_RINGING_ROWS = 400  # size of a structure above which no harmonic is solved
+MAX_STACKED_ROWS = 100  # size of matrices that are solved in one call: 60 harmonics of them take 10 MB
 
 
 def ringing(low: HarmonicBalance, x: FloatArray, omega: float) -> Harmonics:
-    """Return the few harmonics beyond the judging set at which the contact forces of a solution meet a mode.
+    """Return the few harmonics beyond the judging set at which the contact forces of a solution excite a resonance.
 
-    Each harmonic is solved alone, ``q_h = -(Z_h + Bᵀ K B)⁻¹ Bᵀ λ_h``, with the mean stiffness K of the contacts over the period. Where the gaps are
-    larger than at the harmonics before and after, a mode is near.
+    Each harmonic is solved alone, ``q_h = -(Z_h + Bᵀ K B)⁻¹ Bᵀ λ_h``, with the mean stiffness K of the contacts over
+    the period. A mode is near where the gaps are larger than at the harmonics before and after.
 
     Parameters
     ----------
@@ -144,7 +149,10 @@ def loudest(harmonics: Harmonics, sizes: FloatArray) -> Harmonics:
 def _gaps_of_each(
     low: HarmonicBalance, omega: float, harmonics: Harmonics, stiffness: ComplexArray, forces: ComplexArray
 ) -> FloatArray:
-    """Return the largest gap (k,) of each harmonic, solved alone under contact forces (n_contacts, 3, k) with their mean stiffness (n_contacts, 3, 3)."""
+    """Return the largest gap (k,) of each harmonic, solved alone.
+
+    The contact forces are (n_contacts, 3, k), their mean stiffness (n_contacts, 3, 3).
+    """
     side, rows, count = products(low.linear, (0, *harmonics), omega), low.rows, len(harmonics)
     own = forces.reshape(-1, count).T
     parts = np.zeros((2 * count, low.linear.n))
@@ -166,7 +174,7 @@ def _gaps_of_each(
 
 
 def _solved_together(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
-    """Return the solutions (k, n) of systems (k, n, n); infinite where one is singular."""
+    """Return the solutions (k, n) of systems (k, n, n); infinite for singular ones."""
     try:
         return np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
@@ -174,7 +182,7 @@ def _solved_together(matrices: ComplexArray, right: ComplexArray) -> ComplexArra
 
 
 def _solved(matrix: Matrix, right: ComplexArray) -> ComplexArray:
-    """Return the solution (n,) of a system; infinite where it is singular: a mode without damping."""
+    """Return the solution (n,) of a system; infinite if it is singular, at a resonance without damping."""
     try:
         return np.asarray(solved(matrix, right))
     except np.linalg.LinAlgError:

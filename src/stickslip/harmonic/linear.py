@@ -18,7 +18,9 @@ from stickslip.reduction.tuned import TunedWheel
 
 
 class LinearSide(Protocol):
-    """A linear structure before condensation: one structure, or a wheel with a wave for each temporal harmonic, all on the same coordinates.
+    """A linear structure before condensation: one structure, or a wheel with one wave per temporal harmonic.
+
+    All waves have the same coordinates.
 
     Matrices may be complex and unsymmetric, as for waves and aerodynamic forces.
     """
@@ -45,17 +47,17 @@ class LinearSide(Protocol):
 
     @property
     def wheel(self) -> TunedWheel | None:
-        """The tuned wheel if harmonics are its waves; None otherwise."""
+        """The tuned wheel if the harmonics are its waves; None otherwise."""
         ...
 
     @property
     def speed_follows_frequency(self) -> bool:
-        """Whether the matrices belong to the speed at which an engine order excites the frequency."""
+        """Whether the rotor speed follows the frequency along an engine-order line, and with it the matrices."""
         ...
 
     @property
     def harmonics(self) -> int | None:
-        """Highest temporal harmonic for which there are matrices; None: any."""
+        """Highest available temporal harmonic; None: any."""
         ...
 
     def at_frequency(self, omega: float) -> "LinearSide":
@@ -63,7 +65,7 @@ class LinearSide(Protocol):
         ...
 
     def of_harmonic(self, harmonic: int) -> Structure:
-        """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; equal structures are the same object."""
+        """Return the structure of temporal harmonic `harmonic` (0: the mean); equal structures are the same object."""
         ...
 
     def feedback_of(self, harmonic: int) -> Feedback | None:
@@ -76,17 +78,17 @@ class LinearSide(Protocol):
 
 
 def full_structure(side: LinearSide, analysis: str) -> Structure:
-    """Return the structure that all harmonics vibrate as, reduced or not; see `one_structure`."""
+    """Return the one structure of all harmonics, reduced or not; see `one_structure`."""
     return one_structure(side.structure if isinstance(side, Unreduced) else side, analysis)
 
 
 def one_structure(side: LinearSide, analysis: str) -> Structure:
-    """Return the structure that all harmonics vibrate as, for an `analysis` without harmonics.
+    """Return the one structure of all harmonics, for an `analysis` without harmonics.
 
     Raises
     ------
     InputError
-        If the harmonics vibrate as different structures, or if the structure has complex matrices or is not reduced.
+        If the harmonics have different structures, or if the structure has complex matrices or is not reduced.
     """
     if isinstance(side, Unreduced):
         raise input_error(
@@ -107,9 +109,12 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
 
 
 class StiffnessProducts(Hashable, Protocol):
-    """A condensed dynamic stiffness at one frequency, or at one combined frequency for each position in `harmonics`, by its products.
+    """Products of a condensed dynamic stiffness with vectors, at one frequency.
 
-    Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
+    For two-frequency motions, each position in `harmonics` has a combined frequency instead.
+
+    Vectors are real and harmonic-major: (m, n) rows, one for the static term and two for each other harmonic of the
+    support.
     """
 
     @property
@@ -131,7 +136,7 @@ class StiffnessProducts(Hashable, Protocol):
         ...
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z."""
+        """Return the product of the `rows` with the transpose of the real form of Z."""
         ...
 
     def block(self, harmonic: int) -> Matrix:
@@ -140,7 +145,7 @@ class StiffnessProducts(Hashable, Protocol):
 
 
 class Products(StiffnessProducts, Protocol):
-    """A condensed dynamic stiffness and its load at one frequency, by its products."""
+    """Products of a condensed dynamic stiffness with vectors, and its load, at one frequency."""
 
     @property
     def load(self) -> FloatArray:
@@ -159,7 +164,7 @@ class Products(StiffnessProducts, Protocol):
 
 @runtime_checkable
 class Shareable(Products, Protocol):
-    """Products of one real structure, of which one real factor serves all harmonics (`harmonic.shared_factor`)."""
+    """Products of one real structure whose harmonics can share one real factor (`harmonic.shared_factor`)."""
 
     @property
     def omega(self) -> float:
@@ -222,11 +227,11 @@ class DynamicStiffness(Protocol):
 
     @property
     def most(self) -> int | None:
-        """Highest harmonic for which there are matrices; None: any."""
+        """Highest available harmonic; None: any."""
         ...
 
     def load_at(self, omega: float) -> HarmonicLoad:
-        """Return the load at a frequency, N; it is constant unless it follows the speed."""
+        """Return the load at a frequency, N. It is constant unless it depends on the speed."""
         ...
 
     def with_load(self, load: HarmonicLoad) -> Self:

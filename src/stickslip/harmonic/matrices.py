@@ -1,4 +1,4 @@
-"""Matrices of a structure as arrays, checked for what the condensation needs."""
+"""Matrices of a structure as arrays, and checks of the properties that the condensation needs."""
 
 import numpy as np
 import scipy.sparse
@@ -7,9 +7,9 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 
-PROPORTIONAL = 1e-13  # share of a row's largest damping by which the sum of stiffness and mass may differ
-ROWS = 64  # that are compared at a time: matrices of thousands of rows need no copies
-SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
+PROPORTIONAL = 1e-13  # largest deviation from Rayleigh damping, as a share of the largest damping in the row
+ROWS = 64  # compared at a time, to avoid copies of large matrices
+SYMMETRY = 1e-8  # largest difference of transposed entries, as a share of the largest entry
 
 
 def asymmetry(matrix: Matrix) -> float:
@@ -56,7 +56,7 @@ def real_symmetric(structure: Structure, name: str) -> FloatArray:
 
 
 def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, float] | None:
-    """Return a and b with ``c = a k + b m`` to rounding; None if they do not exist."""
+    """Return the Rayleigh coefficients a and b of ``c = a k + b m``, exact to rounding; None if they do not exist."""
     own = np.stack([np.diagonal(k), np.diagonal(m)], axis=1)
     size = np.linalg.norm(own, axis=0)
     if not np.all(size > 0.0):

@@ -1,9 +1,9 @@
-"""Products ``Z q`` of a condensed dynamic stiffness at one frequency, by the cheapest way for its size and damping.
+"""Products ``Z q`` of a condensed dynamic stiffness at one frequency, in the cheapest way for its size and damping.
 
-`MatrixProducts` and `products` multiply by the matrices, where these are known. `SmallBlocks` multiplies all harmonics in one compiled loop: with a
-hundred unknowns a harmonic or fewer, a call from Python for each harmonic costs several times its arithmetic. `linear_force` needs products with
-vectors only, where the interior's modes diagonalise its damping: a corrector whose frequency changes at every step needs the residual of
-each trial, and the condensed matrices only of accepted ones.
+`MatrixProducts` and `products` multiply by known matrices. `SmallBlocks` multiplies all harmonics in one compiled loop:
+up to about a hundred unknowns per harmonic, a Python call for each harmonic costs several times its arithmetic.
+`linear_force` multiplies without forming matrices if the interior's modes diagonalise its damping. A corrector whose
+frequency changes at every step needs the residual of each trial, but the condensed matrices only of accepted ones.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from stickslip.harmonic.harmonic_set import Harmonics, is_full, to_complex, to_r
 from stickslip.harmonic.linear import DynamicStiffness, Products, StiffnessProducts
 from stickslip.harmonic.spectral import Blocks
 
-MAX_SMALL_BLOCK = 96  # unknowns a harmonic up to which this is faster than LAPACK and BLAS for each
+MAX_SMALL_BLOCK = 96  # unknowns per harmonic up to which this is faster than LAPACK and BLAS calls
 
 
 @dataclass(frozen=True, eq=False)
 class SmallBlocks:
-    """One complex matrix a harmonic, the static one first; build it with `small_blocks`.
+    """One complex matrix per harmonic, the static one first; build it with `small_blocks`.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def dynamic_stiffness(linear: StiffnessProducts) -> SmallBlocks:
 
 @dataclass(frozen=True, eq=False)
 class MatrixProducts:
-    """A condensed structure by its matrices at one frequency; see `Products`.
+    """The condensed matrices and load of a structure at one frequency; see `Products`.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class MatrixProducts:
         return _times(self.condensed.stiffness, rows)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z."""
+        """Return the product of the `rows` with the transpose of the real form of Z."""
         return _times(self.condensed.stiffness.conj().transpose(0, 2, 1), rows)
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,7 +110,10 @@ def _times(matrices: ComplexArray, rows: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def matrices(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> MatrixProducts:
-    """Condense the linear side at one frequency; cached, because a Newton iteration at fixed frequency needs it at every step."""
+    """Condense the linear side at one frequency.
+
+    The result is cached, because a Newton iteration at fixed frequency needs it at every step.
+    """
     part = linear.condensed(omega, harmonics[-1])
     if not is_full(harmonics):
         part = part.kept(list(harmonics))
@@ -119,8 +122,8 @@ def matrices(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Ma
 
 @lru_cache(maxsize=2)
 def products(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Products:
-    """Return the linear side at one frequency by its products."""
-    # small matrices are all formed sooner or later, and cost less at once
+    """Return the products of the linear side with vectors, at one frequency."""
+    # small matrices are all needed eventually, and are cheaper to form together
     if isinstance(linear, CondensedStiffness) and linear.n <= MAX_SMALL_BLOCK:
         return matrices(linear, harmonics, omega)
     return linear.products(omega, harmonics)
@@ -162,7 +165,7 @@ def _own(linear: CondensedStiffness, s: FloatArray) -> ComplexArray:
 
 
 def _forward(blocks: Blocks, s: FloatArray, q: ComplexArray) -> ComplexArray:
-    """Return the force of retained coordinates on those of the columns."""
+    """Return the force of the retained coordinates on the coordinates of the columns."""
     k, c, m = blocks
     return np.asarray(q @ k + 1j * s * (q @ c) - s**2 * (q @ m))
 

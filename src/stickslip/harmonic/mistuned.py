@@ -1,7 +1,8 @@
-"""Dynamic stiffness of a mistuned wheel by the waves of the tuned one: a frequency costs one sector times their number.
+"""Dynamic stiffness of a mistuned wheel from the waves of the tuned one.
 
-The interior of the tuned wheel is solved wave by wave. Deviations act on few shares ``y = P u`` of the motion of each sector, with forces
-``z = Δ y``; these are condensed to them by ``(1 + A Δ) y = y_0``, with A what a force on one share does to another one of the tuned wheel.
+Each frequency costs one sector times the number of waves. The interior of the tuned wheel is solved wave by wave.
+Deviations act on a few combinations ``y = P u`` of each sector's motion (its shares), with forces ``z = Δ y``. The
+shares follow from ``(1 + A Δ) y = y_0``, where A is the receptance of the tuned wheel between shares.
 """
 
 from collections.abc import Sequence
@@ -18,12 +19,12 @@ from stickslip.harmonic.harmonic_set import Harmonics, to_complex, to_real
 from stickslip.harmonic.spectral import Blocks
 from stickslip.reduction.mistuned import MistunedWheel, circulant
 
-KEPT_BYTES = 2e8  # of condensed waves that are kept
-MIN_KEPT_WAVES = 8  # frequencies times harmonics that are kept at least
+KEPT_BYTES = 2e8  # of cached condensed waves
+MIN_KEPT_WAVES = 8  # smallest number of cached frequencies times harmonics
 
 
 def by_sectors(wheel: MistunedWheel, retained: IntArray) -> bool:
-    """Whether retained coordinates are the same in all sectors, and springs to the ground act on no other coordinates."""
+    """Whether retained coordinates are the same in all sectors, and springs to the ground act only on them."""
     count, size = wheel.sectors, wheel.n // wheel.sectors
     if retained.size % count:
         return False
@@ -34,12 +35,12 @@ def by_sectors(wheel: MistunedWheel, retained: IntArray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class MistunedStiffness:
-    """A mistuned wheel and its load, seen from the retained coordinates; `condense_mistuned` makes one."""
+    """A mistuned wheel and its load, condensed to the retained coordinates; build it with `condense_mistuned`."""
 
     wheel: MistunedWheel
     retained: IntArray
     load: HarmonicLoad
-    rate: float = 0.0  # 1/s, of damping by the mass beyond that of the wheel
+    rate: float = 0.0  # 1/s, of mass-proportional damping in addition to the wheel's own
     known: dict[float, "At"] = field(default_factory=dict)
 
     @property
@@ -70,7 +71,7 @@ class MistunedStiffness:
 
     @property
     def most(self) -> None:
-        """Highest harmonic for which there are matrices: any."""
+        """Highest available harmonic; None: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
         """Return the load, N, which is the same at all frequencies."""
@@ -145,8 +146,9 @@ class MistunedStiffness:
 class At:
     """A mistuned wheel condensed at one frequency; derivatives are by ``s = hω``.
 
-    Blocks of waves (n_s, ·, ·): `nn`, `nl`, `ln` of the dynamic stiffness, its interior `inverse`, `slopes` of nn, nl, ln and ll, and the
-    shares `near`, `far` of retained and interior motion.
+    Arrays by wave (n_s, ·, ·): blocks `nn`, `nl`, `ln` of the dynamic stiffness, `inverse` of its interior block,
+    `slopes` of nn, nl, ln and ll, and the parts `near` and `far` of the shares that come from retained and interior
+    motion.
     """
 
     linear: MistunedStiffness
@@ -185,18 +187,18 @@ class At:
 
     @cached_property
     def _seen(self) -> ComplexArray:
-        """(n_s, r, n) shares that motion of the retained coordinates causes."""
+        """(n_s, r, n) shares by wave, caused by motion of the retained coordinates."""
         return np.asarray(self.near - self.far @ self._follows)
 
     @cached_property
     def _felt(self) -> ComplexArray:
-        """(n_s, n, r) forces on the retained coordinates by forces on the shares."""
+        """(n_s, n, r) forces on the retained coordinates, caused by forces on the shares."""
         back = self.far.conj().transpose(0, 2, 1)
         return np.asarray(self.near.conj().transpose(0, 2, 1) - self.nl @ (self.inverse @ back))
 
     @cached_property
     def _reaction(self) -> ComplexArray:
-        """(k, k) forces ``z = reaction @ y_0`` of the deviations that are active."""
+        """(k, k) matrix of the forces ``z = reaction @ y_0`` of the active deviations on the shares."""
         sector, share = self.linear.wheel.active
         delta = self.linear.wheel.factors[sector, share]
         receptance = np.fft.ifft(self.far @ self.inverse @ self.far.conj().transpose(0, 2, 1), axis=0)
@@ -205,7 +207,7 @@ class At:
         return np.asarray(np.linalg.solve(np.eye(delta.size) + delta[:, None] * A, np.diag(delta)))
 
     def _deviate(self, shares: ComplexArray, reaction: ComplexArray | None = None) -> ComplexArray:
-        """Return the forces on the shares by wave number, (n_s, r, k), from the shares (n_s, r, k) without them."""
+        """Return the (n_s, r, k) forces of the deviations by wave, from the shares (n_s, r, k) of the tuned wheel."""
         sector, share = self.linear.wheel.active
         y = np.fft.ifft(shares, axis=0, norm="ortho")
         z = np.zeros_like(y)
@@ -241,7 +243,7 @@ class At:
         return out if self._springs is None else np.asarray(out + self._springs)
 
     def _deviation(self) -> ComplexArray:
-        """Return the (n, n) stiffness of the deviations: between waves they act by small blocks."""
+        """Return the (n, n) stiffness of the deviations, whose blocks between waves have low rank."""
         sector, share = self.linear.wheel.active
         count, r = self.linear.wheel.sectors, self.far.shape[1]
         reaction = np.zeros((count, r, count, r), dtype=complex)
@@ -264,7 +266,7 @@ class At:
         return self._to_sectors(self._condensed(near, far), q)
 
     def load(self, near: ComplexArray, far: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the (n,) load, N, and its derivative, from loads on the retained dofs (n,) and on the interior (l,)."""
+        """Return the (n,) condensed load, N, and its derivative, from loads on retained dofs (n,) and interior (l,)."""
         inside = self._to_waves(far)
         outside = self._to_waves(near)
         found = self._condensed(outside, inside)
@@ -286,7 +288,7 @@ class At:
         return np.asarray(alone - self.inverse @ (self.far.conj().transpose(0, 2, 1) @ z))
 
     def _condensed(self, near: ComplexArray, far: ComplexArray) -> ComplexArray:
-        """Return loads by wave number as loads on the retained coordinates alone."""
+        """Return loads by wave number, condensed to the retained coordinates."""
         alone = self.inverse @ far
         out = near - self.nl @ alone
         if self.linear.wheel.active[0].size:
@@ -311,7 +313,7 @@ class At:
 
 @dataclass(frozen=True, eq=False)
 class CondensedSectors:
-    """The condensed matrices of a mistuned wheel at one frequency, by their products."""
+    """The condensed matrices of a mistuned wheel at one frequency, as products with vectors."""
 
     linear: MistunedStiffness
     omega: float
@@ -356,7 +358,7 @@ class CondensedSectors:
         return to_real(np.array([one.times(q) for one, q in pairs]))
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
+        """Return the product of the `rows` with the transpose of the real form of Z, which is the real form of Zᴴ."""
         pairs = zip(self._at, to_complex(rows), strict=True)
         return to_real(np.array([one.adjoint_times(q) for one, q in pairs]))
 

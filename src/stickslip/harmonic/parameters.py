@@ -1,8 +1,9 @@
 """The periodic problem as a function of any parameter: a load level, a field of the contact laws, or a user's function.
 
-A family gives the harmonic balance for each value of the parameter. All its members have the scales of the first one, so that an unknown
-means the same displacement for every value. Residual and Jacobian are those of the member; the derivative of the residual by the
-parameter is a central difference, which is exact for loads and enters the direction of a branch only, never a solution.
+A family returns the harmonic balance for each value of the parameter. All members have the scales of the first one, so
+that an unknown means the same displacement for every value. Residual and Jacobian are exact; the derivative of the
+residual by the parameter is a central difference. This is exact for loads, and it only sets the direction of a branch,
+never a solution.
 """
 
 from collections.abc import Callable
@@ -22,8 +23,8 @@ from stickslip.operators import Jacobian
 BalanceAt = Callable[[float], HarmonicBalance]
 LoadPart = Literal["excitation", "static_load"]
 
-DIFFERENCE = 1e-5  # of the parameter: about the cube root of rounding
-KEPT = 8  # members of a family that are not built again
+DIFFERENCE = 1e-5  # relative to the parameter: about the cube root of the rounding error
+KEPT = 8  # cached members of a family
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,10 @@ def by_parameter(family: BalanceAt, x: FloatArray, omega: float, p: float) -> Fl
 
 
 def difference(function: Callable[[float], FloatArray], p: float) -> FloatArray:
-    """Return the derivative of `function` at `p`: a central difference, one-sided at p = 0, because most parameters are not negative."""
+    """Return the derivative of `function` at `p` by a central difference.
+
+    It is one-sided at p = 0, because most parameters must not be negative.
+    """
     step = DIFFERENCE * abs(p)
     if step == 0.0:
         return (function(DIFFERENCE) - function(0.0)) / DIFFERENCE
@@ -101,15 +105,15 @@ def load_level(balance: HarmonicBalance, part: LoadPart) -> BalanceAt:
 
 
 def law_field(balance: HarmonicBalance, name: str) -> BalanceAt:
-    """Return the family whose parameter is a field of the contact laws, such as ``mu``, ``preload``, ``limit``, ``k_n``, ``initial_gap``.
+    """Return the family whose parameter is a field of the contact laws, such as ``mu``, ``preload`` or ``initial_gap``.
 
     Parameters
     ----------
     balance
         The problem; other fields keep their values.
     name
-        Field of the laws. A law without a field ``initial_gap`` that has a normal stiffness and a preload takes it as the preload
-        ``-k_n initial_gap``.
+        Field of the laws. For a law with normal stiffness and preload but without a field ``initial_gap``, that value
+        is converted to the preload ``-k_n initial_gap``.
 
     Raises
     ------
@@ -136,7 +140,7 @@ def law_field(balance: HarmonicBalance, name: str) -> BalanceAt:
 
 
 def rebuilt(build: BalanceAt, first: float) -> BalanceAt:
-    """Return a family of balances that `build` makes for each value, all with the scales of the `first` one.
+    """Return the family of balances that `build` makes, all with the scales of the balance at `first`.
 
     Raises
     ------
@@ -171,5 +175,5 @@ def _has(law: ContactLaw, name: str) -> bool:
 def _with(law: ContactLaw, name: str, value: float) -> ContactLaw:
     if name in _fields(law):
         return replace(law, **{name: value})  # type: ignore[type-var]  # a dataclass: it has fields
-    # a clearance is a preload that has to be overcome first
+    # a clearance acts as a negative preload
     return replace(law, preload=-law.stuck_stiffness()[2] * value)  # type: ignore[type-var]

@@ -1,16 +1,18 @@
 """The resonance peak as an equation: the periodic problem with the condition that an amplitude is stationary.
 
-The unknowns are those of the balance and the frequency. With ``|a|`` the norm of one retained coordinate over the harmonics that the load
-drives, the condition is
+The unknowns are those of the balance and the frequency. With ``|a|`` the norm of one retained coordinate over the
+harmonics that the load drives, the condition is
 
-- by horizontal tangent, ``d|a|/dω = 0`` along the response, with the exact sensitivity ``dx/dω = -J⁻¹ ∂r/∂ω``: true for every maximum,
-  minimum and saddle of the amplitude (Krack et al. 2017, section 3.4 and note 22);
-- by phase quadrature, the coordinate lags the force by 90°: no second derivative is needed, and it is not exactly the maximum;
-- by variable phase, the coordinate has the phase of the last known maximum (Förster and Krack, arXiv 2012.14458, hold the lag of the linear resonance).
+- by horizontal tangent, ``d|a|/dω = 0`` along the response, with the exact sensitivity ``dx/dω = -J⁻¹ ∂r/∂ω``: true for
+  every maximum, minimum and saddle of the amplitude (Krack et al. 2017, section 3.4 and note 22);
+- by phase quadrature, a lag of the coordinate behind the force of 90°: no second derivative is needed, but it is not
+  exactly the maximum;
+- by variable phase, the phase of the coordinate at the last known maximum (Förster and Krack, arXiv 2012.14458, hold
+  the lag of the linear resonance).
 
-It is asked for along the response, by a tangent (v, τ) of x and ln ω that is there at folds too: ``v`` is τ times the sensitivity. Its gradient
-follows from an adjoint μ. The matrix ``∂(J v + τ ∂r/∂ω)/∂x`` is, by the symmetry of second derivatives, the derivative of J along the
-response, and two evaluations of the Jacobian give it.
+The condition uses the tangent (v, τ) of x and ln ω along the response, which exists at folds too: ``v`` is τ times the
+sensitivity. Its gradient follows from an adjoint μ. It needs the matrix ``∂(J v + τ ∂r/∂ω)/∂x``; since second
+derivatives are symmetric, this is the derivative of J along the response, a difference of two Jacobians.
 """
 
 from dataclasses import dataclass, replace
@@ -29,8 +31,8 @@ from stickslip.operators import transposed_times
 
 Peak = Literal["horizontal_tangent", "phase_quadrature", "variable_phase"]
 EVALUATIONS: dict[Peak, int] = {"horizontal_tangent": 3, "phase_quadrature": 1, "variable_phase": 1}
-ALONG = 1e-6  # relative change of the state over which the Jacobian is differenced
-# the same where forces are sampled, in samples: J changes only when an event passes one
+ALONG = 1e-6  # relative step of the state for differences of the Jacobian
+# the same step in samples, for sampled forces: J changes only when an event passes a sample
 ALONG_SAMPLES = 8.0
 
 
@@ -85,7 +87,9 @@ def driven_by(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
 
 @dataclass(frozen=True)
 class HorizontalTangent:
-    """Condition of a stationary amplitude along the response: its change is orthogonal to the amplitudes. The frequency is the first extra unknown.
+    """Condition of a stationary amplitude along the response: the change of the amplitudes is orthogonal to them.
+
+    The frequency is the first extra unknown.
 
     Parameters
     ----------
@@ -96,7 +100,10 @@ class HorizontalTangent:
     driven: Driven
 
     def value(self, state: State) -> float:
-        """Return the cosine of the angle between the amplitudes and their change along the response; infinite if the tangent is unknown."""
+        """Return the cosine of the angle between the amplitudes and their change along the response.
+
+        It is infinite if the tangent is unknown.
+        """
         if state.along is None:
             return np.inf
         own, change, cosine = self._three(state, state.along)
@@ -121,16 +128,18 @@ class HorizontalTangent:
 
 
 def _gradient(driven: Driven, state: State, along: FloatArray, by_own: FloatArray, by_change: FloatArray) -> FloatArray:
-    """Return (size + m,) the derivative of a function of the driven amplitudes and of their change along the response; zeros where it is unknown.
+    """Return the (size + m,) derivative of a function of the driven amplitudes and of their change along the response.
+
+    Zeros if the derivative is unknown.
 
     Parameters
     ----------
     driven
-        Harmonics of the amplitude.
+        Coordinate and harmonics of the amplitude.
     state
-        Where.
+        State at which the derivative is taken.
     along
-        (size + 1,) the tangent there.
+        (size + 1,) tangent at this state.
     by_own, by_change
         (2 k,) derivatives of the function by the amplitudes and by their change.
     """
@@ -149,7 +158,10 @@ def _gradient(driven: Driven, state: State, along: FloatArray, by_own: FloatArra
 
 
 def _turned(state: State, along: FloatArray, adjoint: FloatArray) -> FloatArray:
-    """Return (size + 1,) ``μᵀ ∂(J v + τ ∂r/∂z)``, by x and by z, with (v, τ) and μ held: the derivative of ``μᵀ [J, ∂r/∂z]`` along (v, τ)."""
+    """Return (size + 1,) ``μᵀ ∂(J v + τ ∂r/∂z)`` by x and by z, with (v, τ) and μ fixed.
+
+    By symmetry this is the derivative of ``μᵀ [J, ∂r/∂z]`` along (v, τ).
+    """
     balance, size = state.setting.balance, float(np.linalg.norm(state.x))
     relative = ALONG_SAMPLES / balance.samples if _is_sampled(balance) else ALONG
     step = relative * size / max(float(np.linalg.norm(along[:-1])), size * abs(float(along[-1])))
@@ -165,7 +177,7 @@ def _weighted(state: State, adjoint: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PhaseQuadrature:
-    """The coordinate lags the force by 90°, in the harmonic of the largest force.
+    """Condition of phase quadrature: the coordinate lags the force by 90°, in the harmonic of the largest force.
 
     Parameters
     ----------
@@ -202,9 +214,9 @@ class PhaseQuadrature:
 
 @dataclass(frozen=True, eq=False)
 class PeakProblem:
-    """The periodic problem with the frequency of an amplitude peak as an additional unknown; an equation in a design parameter.
+    """The periodic problem with the frequency of an amplitude peak as an additional unknown.
 
-    Unknowns are those of the balance and ``ln(ω / omega_scale)``.
+    It is an equation in a design parameter. Unknowns are those of the balance and ``ln(ω / omega_scale)``.
 
     Parameters
     ----------
@@ -215,8 +227,9 @@ class PeakProblem:
     driven
         Coordinate and harmonics of the amplitude.
     phase
-        Phase that the coordinate lags by 90°, rad, in the first harmonic of `driven`, for conditions on the phase: the phase of the force, or, with
-        variable phase, 90° more than that of the coordinate at the last known maximum, see `of_the_top`.
+        Phase that the coordinate lags by 90°, rad, in the first harmonic of `driven`, for conditions on the phase. By
+        phase quadrature it is the phase of the force; by variable phase, the phase of the coordinate at the last known
+        maximum plus 90°, see `of_the_top`.
     omega_scale
         Frequency at which the last unknown is zero, rad/s.
     invert
@@ -238,7 +251,7 @@ class PeakProblem:
 
     @cached_property
     def bordered(self) -> PeriodicProblem:
-        """The equation."""
+        """The periodic problem with the condition of a peak."""
         condition: Condition = HorizontalTangent(self.driven)
         if self.by != "horizontal_tangent":
             condition = PhaseQuadrature(self.driven, self.phase)
@@ -254,10 +267,10 @@ class PeakProblem:
         return replace(self, sharpness=max(float(sharp), 1.0))
 
     def aligned(self, state: State) -> "PeakProblem":
-        """Return the problem with a row along the response at a `state` near the peak, so that it is regular at folds beside it.
+        """Return the problem with a row along the response at a `state` near the peak, so that it is regular at folds.
 
-        Length is measured in changes of the motion relative to its size and in changes of ``ln ω`` relative to the width of the peak, so that the
-        meaning of the tolerance depends neither on units nor on damping.
+        Lengths are relative to the size of the motion, and to the width of the peak in ``ln ω``, so that the meaning of
+        the tolerance depends neither on units nor on damping.
         """
         if state.along is None:
             return self
@@ -267,7 +280,10 @@ class PeakProblem:
         return replace(self, row=row / np.sqrt(row @ state.along))
 
     def of_the_top(self, state: State) -> "PeakProblem":
-        """Return the problem with variable phase: the coordinate's phase at the maximum near a `state`, if `top` finds one, else at the state."""
+        """Return the problem with variable phase, from the phase of the coordinate at the maximum near a `state`.
+
+        If `top` finds no maximum, the phase is taken at the state itself.
+        """
         if state.along is None:
             return self
         away, _ = self.top(state)
@@ -275,7 +291,7 @@ class PeakProblem:
             away = 0.0
         places = self.driven.places(state.setting.balance)[:2]
         (c, s), (by_c, by_s) = state.x[places], state.along[places]
-        turn = (s * by_c - c * by_s) / (c**2 + s**2)  # of the angle of c - i s
+        turn = (s * by_c - c * by_s) / (c**2 + s**2)  # derivative of the angle of c - i s
         return replace(self, phase=float(np.arctan2(-s, c) + turn * away + 0.5 * np.pi))
 
     def omega(self, y: FloatArray) -> float:
@@ -307,9 +323,9 @@ class PeakProblem:
         return float(_gradient(self.driven, state, state.along, by_own, own / square) @ state.along)
 
     def top(self, state: State) -> tuple[float, float]:
-        """Return the distance in ln ω from a `state` to the nearest maximum, and its relative excess in amplitude; NaN if none is visible.
+        """Return the distance in ln ω from a `state` to the nearest maximum, and its relative excess in amplitude.
 
-        ``1/|a|²`` is approximated by a parabola, which is exact for a linear mode.
+        Both are NaN without a maximum. ``1/|a|²`` is approximated by a parabola, which is exact for a linear mode.
         """
         slope, curvature = self.rate(state), self.curvature(state)
         bends = 2.0 * slope**2 - curvature
@@ -320,7 +336,8 @@ class PeakProblem:
     def amplitude_slope(self, state: State) -> float:
         """Return ``d ln|a| / dp`` along the curve of peaks; NaN if the problem is singular.
 
-        By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem): the slope is that at fixed frequency.
+        By horizontal tangent, a shift of the frequency does not change the amplitude (envelope theorem), so this is the
+        slope at fixed frequency.
         """
         by_p = by_parameter(self.family, state.x, state.setting.omega, state.p)
         lagging = self.by != "horizontal_tangent"

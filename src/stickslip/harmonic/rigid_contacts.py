@@ -1,4 +1,4 @@
-"""Gaps of rigid contacts among the coordinates of a periodic problem."""
+"""Positions of the gaps of rigid contacts among the coordinates of a periodic problem."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 
 NORMAL = 2
-STIFF = 1e5  # of springs in place of rigid contacts, over the structure's largest stiffness at a contact: off by 1e-5
+STIFF = 1e5  # stiffness of springs that replace rigid contacts, over the largest stiffness of the structure at a contact: error 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class RigidContacts:
-    """The rigid contacts of an interface and their gaps among the retained coordinates.
+    """The rigid contacts of an interface, and their gaps as retained coordinates.
 
     Attributes
     ----------
@@ -25,8 +25,8 @@ class RigidContacts:
     mu, constant
         (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
     contact, direction, column, factor, offset
-        (n_gaps,) for each gap: its rigid contact, its direction (0, 1, 2 for t, w, n), its retained coordinate, the ratio of gap to coordinate, and the
-        scaled gap at zero displacement.
+        (n_gaps,) for each gap: its rigid contact, its direction (0, 1, 2 for t, w, n), its retained coordinate, the
+        ratio of gap to coordinate, and the scaled gap at zero displacement.
     """
 
     index: IntArray
@@ -40,21 +40,21 @@ class RigidContacts:
 
 
 def rigid_contacts(interface: Interface, rigid: IntArray, balance: HarmonicBalance) -> RigidContacts:
-    """Find the coordinates of the gaps, and write all parameters in the scaled units of a problem.
+    """Find the coordinates of the gaps, and scale all parameters as in a periodic problem.
 
     Parameters
     ----------
     interface
         All contacts, on the retained coordinates.
     rigid
-        (n_rigid,) positions of the rigid ones.
+        (n_rigid,) positions of the rigid contacts.
     balance
-        The periodic problem without them.
+        The periodic problem without rigid contacts.
 
     Raises
     ------
     InputError
-        If a gap is no coordinate, or two gaps are the same coordinate.
+        If a gap is not a coordinate, or two gaps are the same coordinate.
     """
     length, force = balance.displacement_scale, balance.force_scale
     entries: list[tuple[int, int, int, float]] = []

@@ -1,8 +1,9 @@
-"""The Jacobian of a periodic problem with rigid contacts, by its products.
+"""Products of the Jacobian of a periodic problem with rigid contacts.
 
-A rigid gap is predicted a force ``p = -r/f + ε D g``: what equilibrium asks for, from the residual r without rigid contacts, and a penalty on its
-displacement or velocity. Its law returns the part ``E p`` of it. With S the Jacobian without rigid contacts, R its rows at the gaps and f
-the gap over its coordinate, ``J = S + Rᵀ f E (ε D f R - R S / f)``: rows of full matrices, whose product costs no more than that of S.
+Each rigid gap has a predicted force ``p = -r/f + ε D g``: the force that equilibrium requires, from the residual r
+without rigid contacts, and a penalty on displacement or velocity of the gap. The contact law returns its part ``E p``.
+With S the Jacobian without rigid contacts, R its rows at the gaps and f the ratio of gap to coordinate,
+``J = S + Rᵀ f E (ε D f R - R S / f)``. This adds full rows, yet a product with J costs no more than one with S.
 """
 
 from collections.abc import Callable
@@ -25,7 +26,7 @@ Product = Callable[[FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class GapLaws:
-    """Derivatives of the corrected forces at one motion, by gap.
+    """Derivatives of the corrected forces at one motion, gap by gap.
 
     Attributes
     ----------
@@ -34,13 +35,14 @@ class GapLaws:
     own
         (n_gaps, m, m) derivatives of the forces by the predicted forces of the same gap.
     tangent, normal
-        (k,) gaps whose force depends on the normal prediction of their contact, and the gaps along that normal.
+        (k,) tangential gaps whose force depends on the predicted normal force, and the normal gaps of the same
+        contacts.
     by_normal
-        (k, m, m) derivatives by the normal prediction.
+        (k, m, m) derivatives of these forces by the predicted normal force.
     penalty
         (n_gaps,) penalty of the coordinate.
     slides
-        (n_gaps,) whether the penalty acts on the velocity by τ = ωt.
+        (n_gaps,) whether the penalty acts on the velocity by τ = ωt, not on the displacement.
     """
 
     column: IntArray
@@ -64,7 +66,7 @@ class GapLaws:
         return self.factor[:, None, None] * out
 
     def predictions(self, forces: FloatArray) -> FloatArray:
-        """Return the transposed product of `forces`, both (n_gaps, m)."""
+        """Return the product of the transposed derivatives with `forces`, both (n_gaps, m)."""
         given = (self.factor[:, None] * forces)[:, :, None]
         out = self.own.transpose(0, 2, 1) @ given
         back = self.by_normal.transpose(0, 2, 1) @ given[self.tangent]
@@ -93,14 +95,14 @@ class GapLaws:
 
     @cached_property
     def means(self) -> tuple[ComplexArray, ComplexArray]:
-        """(H+1, n_gaps) and (H+1, k) numbers by which each harmonic of a prediction acts on the same one of the force."""
+        """(H+1, n_gaps) and (H+1, k) effect of each harmonic of a prediction on the same harmonic of the force."""
         own, other = (harmonic_means(b[:, None])[:, :, 0, 0] for b in (self.own, self.by_normal))
         return own, other
 
 
 @dataclass(frozen=True, eq=False)
 class RigidFactors:
-    """The costly part of the preconditioner.
+    """Factors of the preconditioner, its costly part.
 
     Attributes
     ----------
@@ -220,7 +222,7 @@ class RigidJacobian:
                 if h == 0:
                     rows[0] = factors.solve_transposed(rows[0])
                     continue
-                # the transpose of a real form is that of the conjugate transpose
+                # the transpose of the real form of A is the real form of Aᴴ
                 solved = factors.solve_transposed(rows[2 * h - 1] + 1j * rows[2 * h])
                 rows[2 * h - 1], rows[2 * h] = solved.real, solved.imag
             return rows.reshape(-1)
@@ -228,7 +230,7 @@ class RigidJacobian:
         return solve
 
     def _sweep(self, kept: RigidFactors, right: FloatArray) -> FloatArray:
-        """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts."""
+        """Solve harmonic by harmonic, from the static one up, with the contact coupling to those already solved."""
         laws, soft = self.laws, self.soft
         rows = self._by_row(right).copy()
         predicted = np.zeros((laws.column.size, len(rows)))
@@ -253,7 +255,7 @@ class RigidJacobian:
         return rows.reshape(-1)
 
     def _penalty(self, harmonic: int) -> ComplexArray:
-        """Return ``ε`` of each coordinate at a gap in a harmonic, times ih where it is on the velocity."""
+        """Return ``ε`` of each coordinate at a gap in a harmonic, times ih for a penalty on the velocity."""
         rate: ComplexArray = np.where(self.laws.slides, 1j * harmonic, 1.0)
         return self.laws.penalty * rate
 
@@ -277,7 +279,7 @@ class RigidLinearisation:
 
 
 def _each_product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Return (n, k) products of matrices (n, k, m) with vectors (n, m); NumPy's own would call BLAS for each."""
+    """Return (n, k) products of matrices (n, k, m) with vectors (n, m); matmul would call BLAS for each."""
     return np.asarray(np.einsum("gkm,gm->gk", matrices, vectors))
 
 

@@ -1,12 +1,13 @@
 """One real factor for all harmonics and frequencies, corrected in the low modes.
 
-With ``A = Z_0 + Bᵀ k B``, k the mean over the harmonics of what each keeps of the contacts, ``D_h = A + ihω C - (hω)² M + ...`` differs from
-A by inertia and damping. In modes far above the harmonics that is little; in the low ones, V, it is all:
+``A = Z_0 + Bᵀ k B``, where k is the mean over the harmonics of their contact stiffness.
+``D_h = A + ihω C - (hω)² M + ...`` differs from A by inertia and damping. These matter little in modes far above the
+harmonics, but dominate in the low modes V:
 
 ``D_h⁻¹ ≈ (1 - V Vᵀ M) A⁻¹ (1 - M V Vᵀ) + V (Vᵀ D_h V)⁻¹ Vᵀ``.
 
-A is factorised in single precision: a Krylov method corrects what is lost. That takes a fortieth of the arithmetic of one complex matrix a
-harmonic, and a twenty-fourth of the memory with H = 5.
+A is factorised in single precision; a Krylov method corrects the error. Compared with one complex matrix per harmonic,
+this takes a fortieth of the arithmetic and, with H = 5, a twenty-fourth of the memory.
 """
 
 from collections.abc import Callable
@@ -24,11 +25,11 @@ from stickslip.harmonic.linear import Shareable
 
 Solve = Callable[[FloatArray | ComplexArray], FloatArray | ComplexArray]
 LEAST_MODES = 24
-MODE_RANGE = 1.2  # times the highest harmonic's frequency up to which modes are wanted ...
-SHARP_MODE_SHARE = 0.75  # ... among this share of them: the last ones are not sharp
-MIN_COORDINATES_PER_MODE = 4  # coordinates for each mode at least
+MODE_RANGE = 1.2  # modes are needed up to this multiple of the highest harmonic's frequency ...
+SHARP_MODE_SHARE = 0.75  # ... within this share of the computed modes: the last ones are inaccurate
+MIN_COORDINATES_PER_MODE = 4  # smallest number of coordinates per mode
 SUBSPACE_ITERATIONS = 4  # of the subspace iteration for the modes
-MAX_SINGLE_RESIDUAL = 0.01  # residual that single precision may leave of a random right side
+MAX_SINGLE_RESIDUAL = 0.01  # largest residual of single precision with a random right side
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,10 @@ class SharedFactor:
     projected: CondensedProduct
 
     def of(self, linear: Shareable, means: ComplexArray, scale: float) -> "SharedInverses":
-        """Return the approximate inverses at the frequency of `linear`, with the contact stiffness `means` (H+1, n_contacts, 3, 3) in the modes."""
+        """Return the approximate inverses at the frequency of `linear`.
+
+        The contact stiffness `means` (H+1, n_contacts, 3, 3) is included only in the low modes.
+        """
         at = self.projected.moved_to(linear)
         inverses = []
         for place, h in enumerate(linear.harmonics):
@@ -72,10 +76,10 @@ class SharedFactor:
 
 @dataclass(frozen=True, eq=False)
 class SharedInverses:
-    """``D_h⁻¹`` of all harmonics, approximately."""
+    """Approximate inverses ``D_h⁻¹`` of all harmonics."""
 
     kept: SharedFactor
-    inner: tuple[ComplexArray, ...]  # (k, k), of each harmonic: in the modes
+    inner: tuple[ComplexArray, ...]  # of each harmonic, (k, k), in the low modes
 
     def solve(self, place: int, rows: FloatArray) -> FloatArray:
         """Solve harmonic number `place` for its one or two rows (k, n)."""
@@ -84,7 +88,7 @@ class SharedInverses:
 
     def solve_transposed(self, place: int, rows: FloatArray) -> FloatArray:
         """Solve with the transpose of the real form of harmonic number `place`."""
-        # the transpose of a real form is that of the conjugate transpose
+        # the transpose of the real form of A is the real form of Aᴴ
         return _solve(self.kept.factor.solve_transposed, self.kept, self.inner[place].conj().T, rows)
 
 
@@ -106,7 +110,9 @@ def _in_its_precision(factor: AnyFactors, solve: Solve, right: FloatArray) -> Fl
 
 
 def shared_factor(linear: Shareable, means: ComplexArray, rows: SparseRows, scale: float) -> SharedFactor | None:
-    """Factorise A and find its low modes; None if A is singular, too many modes are low, or fewer coordinates have mass than modes are needed.
+    """Factorise A and compute its low modes.
+
+    None if A is singular, too many modes are low, or fewer coordinates have mass than modes are needed.
 
     Parameters
     ----------
@@ -148,7 +154,7 @@ def _copied(matrix: Matrix, single: bool) -> Matrix:
 
 
 def _enough_modes(linear: Shareable, factor: AnyFactors, scale: float) -> tuple[FloatArray, FloatArray] | None:
-    """Return low modes beyond the highest harmonic, and M times them; None if that takes too many, or more than the mass has."""
+    """Return the modes to above the highest harmonic, and M times them; None if too many, or more than have mass."""
     wanted = scale * (MODE_RANGE * linear.harmonics[-1] * linear.omega) ** 2
     most = linear.n // MIN_COORDINATES_PER_MODE
     count = min(LEAST_MODES, most)
@@ -165,9 +171,9 @@ def _enough_modes(linear: Shareable, factor: AnyFactors, scale: float) -> tuple[
 
 
 def _low_modes(linear: Shareable, factor: AnyFactors, count: int) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them, by subspace iteration (Bathe & Wilson 1973).
+    """Return approximate low eigenvalues (k,), modes (n, k) of unit mass, and M times them.
 
-    None if no `count` modes have mass.
+    The method is subspace iteration (Bathe & Wilson 1973). None if fewer than `count` modes have mass.
     """
     weighted: FloatArray = np.random.default_rng(0).standard_normal((linear.n, count))
     sizes, modes = np.zeros(count), weighted
@@ -176,7 +182,7 @@ def _low_modes(linear: Shareable, factor: AnyFactors, count: int) -> tuple[Float
         stiffness = modes.T @ weighted
         weighted = linear.mass_product(modes)
         mass = modes.T @ weighted
-        # of unit mass; the stiffness is symmetric but for friction under a normal force
+        # scaled to unit mass; the stiffness is symmetric except for friction that depends on the normal force
         try:
             sizes, turn = scipy.linalg.eigh(stiffness + stiffness.T, mass + mass.T)
         except np.linalg.LinAlgError:

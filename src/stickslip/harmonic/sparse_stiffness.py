@@ -1,7 +1,7 @@
-"""A structure that stays as the finite elements made it: all dofs are unknowns, its matrices are sparse, and nothing is condensed.
+"""An unreduced structure: all dofs are unknowns, its matrices are sparse, and nothing is condensed.
 
-With thousands of contacts a reduction to their coordinates costs more than it saves: the constraint modes fill n × n_contacts numbers, and the
-reduced matrices are full.
+With thousands of contacts, reduction to their coordinates costs more than it saves: the constraint modes have n ×
+n_contacts entries, and the reduced matrices are full.
 """
 
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ class SparseMatrices:
 
     @property
     def entries(self) -> int:
-        """Entries of the stiffness, for costs."""
+        """Number of entries of the stiffness, for cost estimates."""
         return int(self.stiffness.nnz)
 
     @cached_property
@@ -75,7 +75,7 @@ class SparseMatrices:
 
 @dataclass(frozen=True, eq=False)
 class SparseProduct:
-    """A sparse structure and its load at one frequency; rows as in `CondensedProduct`."""
+    """Products of a sparse structure and its load at one frequency; rows as in `CondensedProduct`."""
 
     matrices: SparseMatrices
     omega: float
@@ -89,7 +89,7 @@ class SparseProduct:
 
     @property
     def entries(self) -> int:
-        """Entries of the stiffness, for costs."""
+        """Number of entries of the stiffness, for cost estimates."""
         return self.matrices.entries
 
     @cached_property
@@ -104,7 +104,7 @@ class SparseProduct:
 
     @property
     def load_slope(self) -> FloatArray:
-        """(m, n) derivative of the load by ω: none."""
+        """(m, n) derivative of the load by ω: zero."""
         return np.zeros_like(self.load)
 
     def same(self, other: object) -> bool:
@@ -121,7 +121,10 @@ class SparseProduct:
         return dynamic_rows(self.matrices.times(rows), self.frequencies)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, the conjugate of the product of Zᵀ and the conjugate."""
+        """Return the product of the `rows` with the transpose of the real form of Z.
+
+        It is the conjugate of Zᵀ times the conjugate of q.
+        """
         mirrored = rows.copy()
         mirrored[2::2] *= -1.0
         out = dynamic_rows(self.matrices.transposed.times(mirrored), self.frequencies)
@@ -176,7 +179,7 @@ LEAST_SPARSE = 150  # dofs below which arrays are as fast
 
 @dataclass(frozen=True, eq=False)
 class Unreduced:
-    """A structure without condensation of dofs, for `System` with thousands of contacts.
+    """A structure of which no dofs are condensed, for `System` with thousands of contacts.
 
     Parameters
     ----------
@@ -203,7 +206,7 @@ class Unreduced:
 
     @property
     def wheel(self) -> None:
-        """No tuned wheel (see `LinearSide`)."""
+        """The tuned wheel: none (see `LinearSide`)."""
         return None
 
     @property
@@ -213,23 +216,23 @@ class Unreduced:
 
     @property
     def reduced(self) -> bool:
-        """Whether coordinates are condensed: none are (see `LinearSide`)."""
+        """Whether coordinates are condensed: no (see `LinearSide`)."""
         return False
 
     @property
     def harmonics(self) -> None:
-        """There are matrices for any harmonic (see `LinearSide`)."""
+        """Highest available harmonic; None: any (see `LinearSide`)."""
 
     def at_frequency(self, omega: float) -> "Unreduced":
         """Return itself at every frequency (see `LinearSide`)."""
         return self
 
     def of_harmonic(self, harmonic: int) -> Structure:
-        """Return the structure: it vibrates as itself in every harmonic."""
+        """Return the structure, the same one for every harmonic."""
         return self.structure.of_harmonic(harmonic)
 
     def feedback_of(self, harmonic: int) -> None:
-        """No aerodynamic force."""
+        """Return None: there is no aerodynamic force."""
 
     def grounded(self, springs: Matrix) -> "Unreduced":
         """Return the structure with springs, a sparse matrix (n, n) in N/m, to the ground."""
@@ -250,7 +253,7 @@ class SparseStiffness:
 
     @property
     def entries(self) -> int:
-        """Entries of the stiffness, for costs."""
+        """Number of entries of the stiffness, for cost estimates."""
         return self.matrices.entries
 
     @property
@@ -265,7 +268,7 @@ class SparseStiffness:
 
     @property
     def most(self) -> None:
-        """Highest harmonic for which there are matrices: any."""
+        """Highest available harmonic; None: any."""
 
     def load_at(self, _omega: float) -> HarmonicLoad:
         """Return the load, N, which is the same at all frequencies."""

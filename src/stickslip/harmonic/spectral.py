@@ -1,13 +1,15 @@
-"""Spectral decomposition of the interior: a frequency costs products with constant matrices and no factorisation (Krack et al. 2017, app. 5).
+"""Spectral decomposition of the interior (Krack et al. 2017, app. 5).
 
-In interior modes of unit stiffness ``D_LL(p) = 1 + p C + p² M`` with ``p = iΩ`` and diagonal M, and after the static condensation of
-the interior ``D_NL(p) = p (c + p m)``. Two exact sums follow, in which frequency enters through scalar weights alone:
+Each frequency costs products with constant matrices, and no factorisation. In interior modes of unit stiffness
+``D_LL(p) = 1 + p C + p² M`` with ``p = iΩ`` and diagonal M. After the static condensation of the interior
+``D_NL(p) = p (c + p m)``. This gives two exact sums, in which the frequency appears only in scalar weights:
 
-- modes, where C is diagonal too and the columns of c are multiples of those of m (Rayleigh damping, damping by mode);
-- poles, with any other C: ``D_LL⁻¹ = Σ φ ψᵀ / (1 - p ν)`` over the 2 l state-space eigenvectors, ``(ν² + ν C + M) φ = 0``. There are no
-  infinite ν: coordinates without mass have ν = 0. The numerator is divided by ``1 - p ν``, so that residues do not depend on p.
+- over modes, if C is diagonal too and the columns of c are multiples of those of m (Rayleigh damping, damping by mode);
+- over poles, for any other C: ``D_LL⁻¹ = Σ φ ψᵀ / (1 - p ν)`` over the 2 l state-space eigenvectors,
+  ``(ν² + ν C + M) φ = 0``. No ν is infinite: coordinates without mass have ν = 0. The numerator is divided by
+  ``1 - p ν``, so that residues do not depend on p.
 
-Coriolis terms make C unsymmetric: the sum over poles then has another c on its right, ``D_LN(p) = p (c' + p m)ᵀ``.
+Coriolis terms make C unsymmetric. The sum over poles then has a different c on its right, ``D_LN(p) = p (c' + p m)ᵀ``.
 """
 
 from dataclasses import dataclass
@@ -61,7 +63,7 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
     """
     n = mass.size
     root = np.diag(np.sqrt(np.maximum(mass, 0.0)))
-    # displacement and root times displacement over ν: normal if C = 0, whatever the spread of frequencies
+    # displacement, and root times displacement over ν: a normal matrix if C = 0, for any spread of frequencies
     state = np.block([[-damping, -root], [root, np.zeros((n, n))]])
     with threads_for(2 * n):
         nu, vectors = np.linalg.eig(state)
@@ -76,20 +78,20 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
 
 
 Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
-LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
-PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
-LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
-# share of the largest damping in a row by which a sum of products with the modes of the interior may round
+LARGEST_STATE_SPACE = 2000  # interior coordinates; above, the eigenproblem takes many minutes
+PARALLEL = 1e-10  # largest deviation of the columns of c from multiples of those of m, relative to c
+LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; above, they are multiplied at each frequency
+# rounding of a sum of products with the interior modes, relative to the largest damping in a row
 IN_MODES = 1e-11
-FAST = 10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
+FAST = 10.0  # poles below this multiple of the lowest interior frequency are slow; see `_poles`
 
 
 @dataclass(frozen=True, eq=False)
 class ModeTerms:
     """Sum over modes: real, ``Z = Σ_k P_k p^k - left diag(w(p)) right``, ``w = v² / d`` with ``v = p (κ + p)`` and ``d = 1 + p c + p² m``.
 
-    Their derivatives are ``dw/dp = v q / d²`` with ``q = 2 κ + (4 + κ c) p + 3 c p² + 2 m p³``, and ``d(v/d)/dp = r / d²`` with
-    ``r = κ + 2 p + (c - κ m) p²``.
+    The derivatives are ``dw/dp = v q / d²`` with ``q = 2 κ + (4 + κ c) p + 3 c p² + 2 m p³``, and
+    ``d(v/d)/dp = r / d²`` with ``r = κ + 2 p + (c - κ m) p²``.
     """
 
     left: FloatArray  # (n, J)
@@ -99,7 +101,7 @@ class ModeTerms:
     damping: FloatArray  # (l,) c
     mass: FloatArray  # (l,) m
     symmetric: bool = True
-    direct: None = None  # the load takes ``left diag(v / d) source`` alone
+    direct: None = None  # the load needs only ``left diag(v / d) source``
 
     def weights(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
         """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and v / d and its derivative at the first `loaded` of them."""
@@ -120,7 +122,7 @@ class ModeTerms:
             (2.0 * kappa, 4.0 + kappa * c, 3.0 * c, 2.0 * m),
             (kappa, 2.0 * one, c - kappa * m, none),
         )
-        return np.array(rows, dtype=complex)  # as `powers` are, or each product would make it so
+        return np.array(rows, dtype=complex)  # complex like `powers`: a real array would be converted in each product
 
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
@@ -128,19 +130,19 @@ class ModeTerms:
 
     @cached_property
     def table(self) -> FloatArray:
-        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial`, and less the products of columns of `left` and rows of `right`."""
+        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial` and of the residues, with minus sign."""
         rows, columns = np.triu_indices(self.left.shape[0])
         residues = (self.left[rows] * self.left[columns]).T
         return np.concatenate([self.polynomial[:, rows, columns], -residues])
 
     def on_table(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return the `weights` of the rows of `table` beyond the polynomial, and those of the load."""
+        """Return the `weights` for the rows of `table` after the polynomial, and for the load."""
         return self.weights(powers, loaded)
 
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """Sum over poles: as `ModeTerms`, with complex matrices and ``w = p^2a / (1 - p ν)``."""
+    """Sum over poles: like `ModeTerms`, with complex matrices and ``w = p^2a / (1 - p ν)``."""
 
     left: ComplexArray
     right: ComplexArray
@@ -151,7 +153,7 @@ class Poles:
     symmetric: bool
 
     def weights(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and those of the load at the first `loaded` of them."""
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and load weights at the first `loaded` ones."""
         p = powers[:, 1:2]
         e = 1.0 / (1.0 - p * self.states.nu)
         w = np.where(self.power == 2, p**4, p * p) * e
@@ -171,12 +173,15 @@ class Poles:
 
     @cached_property
     def table(self) -> FloatArray:
-        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial`, less the residues R of real poles, ``2 Re R`` and ``-2 Re(ν* R)`` of pairs."""
+        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial` and of the residues R, with minus sign.
+
+        Real poles have R, pairs of poles ``2 Re R`` and ``-2 Re(ν* R)``.
+        """
         rows, columns = np.triu_indices(self.left.shape[0])
         single, pair = self._single_and_pairs
         kept = np.concatenate([single, pair])
         left, right = self.left[:, kept], self.right[kept].T
-        # only the sum of residues is symmetric where poles repeat; their symmetric parts have the same sum
+        # for repeated poles only the sum of residues is symmetric; their symmetric parts have the same sum
         each = 0.5 * (left[rows] * right[columns] + left[columns] * right[rows]).T
         own, paired = each[: single.size].real, each[single.size :]
         turned = self.states.nu[pair, None].conj() * paired
@@ -184,7 +189,7 @@ class Poles:
         return np.concatenate([polynomial, -own, -2.0 * paired.real, 2.0 * turned.real])
 
     def on_table(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return the `weights` of the rows of `table` beyond the polynomial, and those of the load.
+        """Return the `weights` for the rows of `table` after the polynomial, and for the load.
 
         A pair of poles adds up to ``g (2 Re R - 2 p Re(ν* R))`` with ``g = p^2a / (1 - 2 p Re ν + p² |ν|²)``.
         """
@@ -207,7 +212,7 @@ class Poles:
 
     @cached_property
     def _denominators(self) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:
-        """Return where a is 2, and s, m and 2 m² of the ``1 - p s + p² m²`` of real poles and of pairs, which share one."""
+        """Return where a is 2, and s, m and 2 m² of the denominators ``1 - p s + p² m²`` of real poles and pairs."""
         single, pair = self._single_and_pairs
         nu = self.states.nu
         size = np.concatenate([np.zeros(single.size), np.abs(nu[pair])])
@@ -217,7 +222,7 @@ class Poles:
 
     @cached_property
     def _single_and_pairs(self) -> tuple[IntArray, IntArray]:
-        """Return the places of real poles and of the first one of each conjugate pair, which LAPACK puts beside each other."""
+        """Return the positions of real poles, and of the first pole of each conjugate pair."""
         imaginary = self.states.nu.imag
         return np.flatnonzero(imaginary == 0.0), np.flatnonzero(imaginary > 0.0)
 
@@ -233,7 +238,7 @@ class Interior:
     nl: Blocks
     ll: Blocks
     diagonal: bool
-    ln: Blocks | None = None  # transposes of the blocks back, where they differ
+    ln: Blocks | None = None  # transposed blocks from retained coordinates to interior, if damping is not symmetric
     loss: Blocks | None = None
 
     @property
@@ -243,12 +248,12 @@ class Interior:
 
     @cached_property
     def rayleigh(self) -> tuple[float, float] | None:
-        """Rayleigh coefficients (of stiffness and mass) of the damping on the retained coordinates; None if it is no Rayleigh damping."""
+        """Rayleigh coefficients (of stiffness and mass) on the retained coordinates; None without Rayleigh damping."""
         return None if self.ln is not None else shares_of_two(*self.nn)
 
     @cached_property
     def rayleigh_across(self) -> tuple[float, float] | None:
-        """The same coefficients, if they also hold for the damping between retained coordinates and interior."""
+        """The same coefficients if they also fit the damping across to the interior; None otherwise."""
         own = self.rayleigh
         return own if own is not None and are_shares(*own, self.nl, IN_MODES) else None
 
@@ -260,7 +265,10 @@ class Interior:
 
     @cached_property
     def states(self) -> StateSpace | None:
-        """State-space eigenvectors; None if the damping is diagonal or structural, the interior too large, or its eigenvectors ill-conditioned."""
+        """State-space eigenvectors of the interior.
+
+        None if the damping is diagonal or structural, the interior too large, or its eigenvectors ill-conditioned.
+        """
         _, damping, mass = self.ll
         if self.diagonal or self.loss is not None or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE:
             return None
@@ -268,7 +276,7 @@ class Interior:
 
     @cached_property
     def terms(self) -> Terms | None:
-        """Terms of the condensed stiffness; None if there is no such sum."""
+        """Terms of the sum for the condensed stiffness; None if no such sum exists."""
         if self.loss is not None:
             return None
         if self.diagonal:
@@ -303,8 +311,9 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
 def _poles(interior: Interior, states: StateSpace) -> Poles:
     """Divide ``p² (c + p m) φ ψᵀ (c' + p m)ᵀ`` by ``1 - p ν``.
 
-    With ``(c + p m) φ = p r + (1 - p ν) c φ`` and ``r = (ν c + m) φ`` where ν is small, with ``= v - (1 - p ν) m φ / ν`` and
-    ``v = (c + m / ν) φ`` where it is large: neither part is much larger than their sum at the frequencies of interest.
+    For small ν, ``(c + p m) φ = p r + (1 - p ν) c φ`` with ``r = (ν c + m) φ``. For large ν, it is
+    ``v - (1 - p ν) m φ / ν`` with ``v = (c + m / ν) φ``. In both cases, neither term is much larger than their sum at
+    the frequencies of interest.
     """
     ll = interior.ll
     whole, c, m, back = _statically_condensed(interior.nn, interior.nl, ll, interior.ln)
@@ -314,7 +323,7 @@ def _poles(interior: Interior, states: StateSpace) -> Poles:
     c_left, m_left, c_right, m_right = c @ forward, m @ forward, backward @ back.T, backward @ m.T
     left = np.where(slow, c_left + m_left / safe, nu * c_left + m_left)
     right = np.where(slow, c_right.T + m_right.T / safe, nu * c_right.T + m_right.T).T
-    # what the division leaves, (1 - p ν) times: c, or -m / ν
+    # the remainder of the division, over (1 - p ν): c, or -m / ν
     left_rest = np.where(slow, -m_left / safe, c_left)
     right_rest = np.where(slow, -m_right.T / safe, c_right.T).T
     crossed = left @ np.where(slow[:, None], right_rest, 0.0) + left_rest @ np.where(slow[:, None], right, 0.0)
@@ -389,7 +398,7 @@ def _multiplied(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: 
 
 
 def _tabled(terms: Terms, powers: ComplexArray, weights: ComplexArray, out: ComplexArray) -> None:
-    """Do the same by one real product with the table of residues."""
+    """Write the same sum to `out` by one real product with the table of residues."""
     n, table = terms.left.shape[0], terms.table
     whole = np.concatenate([powers, weights], axis=2)
     rows = np.array([whole.real, whole.imag]).reshape(-1, len(table))
@@ -414,7 +423,7 @@ def _rates(order: int) -> tuple[ComplexArray, ComplexArray]:
 
 @lru_cache(maxsize=8)
 def _places(n: int) -> IntArray:
-    """Return the (n, n) places of the entries of a symmetric matrix in its upper triangle."""
+    """Return the (n, n) positions of the entries of a symmetric matrix in its upper triangle."""
     places = np.zeros((n, n), dtype=np.int64)
     places[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
     return np.maximum(places, places.T)

@@ -1,4 +1,4 @@
-"""Names of the strategies, and their traits for study files; `stickslip.harmonic.selection` holds the strategies."""
+"""Names and options of the strategies in `stickslip.harmonic.selection`, for study files."""
 
 # name → file and class
 STRATEGIES = {
@@ -15,7 +15,7 @@ STRATEGIES = {
     "always_high": ("fixed", "AlwaysHigh"),
 }
 VERIFYING = frozenset({"jacobian_alert", "guarded_alert", "goal_oriented"})  # they predict an error
-FIXED = frozenset({"always_low", "always_high"})  # they decide nothing
+FIXED = frozenset({"always_low", "always_high"})  # they always accept
 OPTIONS = {  # option → strategies that have it
     "per_dof": ("grolet", "maple"),
     "repeats": ("grolet", "laxalde", "suess_jacobian", "suess_spectral"),

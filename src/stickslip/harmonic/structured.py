@@ -1,9 +1,10 @@
-"""The Jacobian of the harmonic balance by its parts, and its preconditioner.
+"""Products of the Jacobian of the harmonic balance, and its preconditioner.
 
-``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``D_h = Z_h + K̂ʰʰ``, one
-complex matrix a harmonic or one real one for all of them (`harmonic.shared_factor`), therefore precondition the whole. From the lowest harmonic to the highest, each is solved with what those below
-it do at the contacts: block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``, which halves the iterations of D alone and costs no factors. With
-``J = P + Bᵀ(K̂ - K_P)B`` no product with Z is needed where D was made at the same frequency.
+``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics except for ``K̂``, which is local to each contact. Thus factors
+of ``D_h = Z_h + K̂ʰʰ``, one complex matrix per harmonic or one real matrix for all (`harmonic.shared_factor`), are a
+preconditioner. From the lowest harmonic to the highest, each is solved including the contact coupling to those below:
+block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``. It halves the iterations compared with D alone and needs no further
+factors. With ``J = P + Bᵀ(K̂ - K_P)B`` no product with Z is needed if D was made at the same frequency.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,8 +41,8 @@ from stickslip.harmonic.sparse_stiffness import SparseProduct
 from stickslip.harmonic.stuck_contact_elimination import Coupling, Resting, TransposedElimination, coupling, known
 from stickslip.operators import Costs, JacobianOperator
 
-KEPT = 1000  # unknowns up to which the array of a dynamic stiffness is kept
-SHARED = 150  # unknowns a harmonic from which one factor for all harmonics costs less than one each
+KEPT = 1000  # unknowns up to which the array of a dynamic stiffness is cached
+SHARED = 150  # unknowns per harmonic above which one factor for all harmonics costs less than one each
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -56,7 +57,7 @@ class HarmonicFactors:
     linear
         The dynamic stiffness in the factors.
     means
-        (len(harmonics), n_contacts, 3, 3) the contact stiffness in the factors, N/m.
+        (len(harmonics), n_contacts, 3, 3) contact stiffness in the factors, N/m.
     factors
         Factors of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
     inverses
@@ -79,7 +80,7 @@ class HarmonicFactors:
         """Solve with the transpose of the real form of harmonic number `place`."""
         if place == 0:
             return np.asarray(self.factors[0].solve_transposed(rows[0]), dtype=float)[None]
-        # the transpose of a real form is that of the conjugate transpose
+        # the transpose of the real form of A is the real form of Aᴴ
         solved = self.factors[place].solve_transposed(rows[0] + 1j * rows[1])
         return np.stack([solved.real, solved.imag])
 
@@ -89,14 +90,14 @@ Kept = HarmonicFactors | SharedFactor
 
 @dataclass(frozen=True, eq=False)
 class StructuredJacobian:
-    """``scale (Z + Bᵀ K̂ B)`` by its products.
+    """The Jacobian ``scale (Z + Bᵀ K̂ B)`` as products with vectors.
 
     Parameters
     ----------
     linear
         Dynamic stiffness at the frequency.
     blocks
-        (n_contacts, P, m, m) derivatives of the contact forces by the gaps, N/m, of the same harmonics.
+        (n_contacts, P, m, m) derivatives of the contact forces by the gaps, N/m, in the same harmonics.
     rows
         Gap operator by contact.
     scale
@@ -134,7 +135,7 @@ class StructuredJacobian:
 
     @property
     def transposed(self) -> "Transposed":
-        """Its transpose."""
+        """Transpose of the Jacobian."""
         return Transposed(self)
 
     @cached_property
@@ -154,12 +155,15 @@ class StructuredJacobian:
 
     @cached_property
     def _reduced_cost(self) -> float:
-        """Estimated cost of a solution by an array without the resting contacts."""
+        """Estimated cost of a solution as an array after elimination of uncoupled unknowns."""
         rested = known(self.linear, self.rows).knows(self.coupling, self.scale)
         return reduced_cost(self.linear.n, self.coupling.counts, known=rested)
 
     def eliminated(self) -> Resting | None:
-        """Return the elimination of unknowns that stuck and open contacts leave uncoupled; None if it is no cheaper than the whole array."""
+        """Return the elimination of unknowns that stuck and open contacts leave uncoupled.
+
+        None if the full array is cheaper.
+        """
         if isinstance(self.linear, SparseProduct) or self.costs.array < self._reduced_cost:
             return None
         return known(self.linear, self.rows).without_resting(self.coupling, self.rows, self.scale)
@@ -184,7 +188,10 @@ class StructuredJacobian:
             yield mean, block
 
     def preconditioner(self) -> Kept | None:
-        """Factorise the preconditioner: one factor for all harmonics where the structure allows it, else each ``Z_h + K̂ʰʰ``. None: singular."""
+        """Factorise the preconditioner; None if it is singular.
+
+        One factor serves all harmonics if the structure allows it; otherwise each ``Z_h + K̂ʰʰ`` is factorised.
+        """
         if isinstance(self.linear, Shareable) and self.linear.n >= SHARED:
             shared = shared_factor(self.linear, harmonic_means(self.blocks), self.rows, self.scale)
             if shared is not None:
@@ -192,7 +199,10 @@ class StructuredJacobian:
         return self._harmonic_factors()
 
     def better_preconditioner(self, kept: Kept) -> HarmonicFactors | None:
-        """Return the factors of ``Z_h + K̂ʰʰ`` if `kept` is one factor for all harmonics; None if `kept` has them already, or a matrix is singular."""
+        """Return the factors of ``Z_h + K̂ʰʰ`` if `kept` is one factor for all harmonics.
+
+        None if `kept` already has a factor per harmonic, or a matrix is singular.
+        """
         return self._harmonic_factors() if isinstance(kept, SharedFactor) else None
 
     def _harmonic_factors(self) -> HarmonicFactors | None:
@@ -210,7 +220,10 @@ class StructuredJacobian:
         return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)
 
     def preconditioned_by(self, kept: Kept) -> tuple[Solve, Product]:
-        """Return the solver of ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        """Return the solver of ``P x = y``, and ``J v`` as a function of v and ``P v``.
+
+        P has the kept factors and the contact coupling of this Jacobian.
+        """
         own = self._inverses(kept)
         if isinstance(own, HarmonicFactors) and own.inverses is not None:
             return self._by_triangles(own, own.inverses)
@@ -231,7 +244,7 @@ class StructuredJacobian:
         return solve, product
 
     def _by_triangles(self, own: HarmonicFactors, inverses: SmallBlocks) -> tuple[Solve, Product]:
-        """Return the same where matrices are small: what couples harmonics is laid out for all products."""
+        """Return the same functions for small matrices, with the coupling of the harmonics stored for all products."""
         parts = triangles(self.blocks, own.means)
         columns, values = self.rows.columns, self.rows.values
         gap, force = np.empty((2, len(self.blocks), 3, 2 * len(self.linear.harmonics) - 1))
@@ -269,7 +282,7 @@ class StructuredJacobian:
         return solve
 
     def _subtract_from_lower(self, rows: FloatArray, first: int, last: int) -> None:
-        """Subtract what the transposed coupling makes of the rows from `first` to `last` from those before them."""
+        """Subtract the transposed coupling with the rows from `first` to `last` from the rows before them."""
         gap = self.rows.gaps(rows[first:last]).reshape(2, -1, 3)
         force = np.zeros((first, *gap.shape[1:]))
         for block, (row, col) in enumerate(PAIRS[: self.blocks.shape[1]]):
@@ -295,7 +308,10 @@ class StructuredJacobian:
         return rows.reshape(-1)
 
     def subtract_below(self, span: tuple[int, int, int], gap: FloatArray, rows: FloatArray) -> None:
-        """Subtract the contact forces of the solved lower harmonics from a harmonic of the right side `rows`; see `subtract_lower`."""
+        """Subtract the contact forces of the lower, solved harmonics from a harmonic of the right side `rows`.
+
+        See `subtract_lower` for the arguments.
+        """
         subtract_lower(self.blocks, self.rows.columns, self.rows.values, rows, *span, self.scale, gap, rows)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
@@ -375,7 +391,10 @@ class Transposed:
 
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
-    """Return the harmonic-major real form of complex (n, n) `blocks`, one a harmonic, the static one first, in Fortran order."""
+    """Return the harmonic-major real form of complex (n, n) `blocks`, in Fortran order.
+
+    There is one block per harmonic, the static one first.
+    """
     m, n = 2 * len(blocks) - 1, blocks[0].shape[0]
     columns = np.zeros((m, n, m, n))  # of the matrix, whose rows come last
     cos, sin = slice(1, None, 2), slice(2, None, 2)
@@ -389,5 +408,8 @@ def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def real_form(linear: MatrixProducts) -> FloatArray:
-    """Return the real form of the dynamic stiffness at one frequency, N/m; cached, because a Newton iteration at fixed frequency needs it at every step."""
+    """Return the real form of the dynamic stiffness at one frequency, N/m.
+
+    It is cached, because a Newton iteration at fixed frequency needs it at every step.
+    """
     return real_matrix(linear.condensed.stiffness)

@@ -1,10 +1,12 @@
-"""Unknowns that contacts at rest do not couple, eliminated harmonic by harmonic before the array of the others is formed.
+"""Elimination, harmonic by harmonic, of the unknowns that contacts do not couple.
 
-``J = D + Bᵀ L B``: L are the derivatives of the forces that depend on other harmonics, D is all else and block-diagonal. An equation that holds no
-force of L knows its own harmonic alone. Such are those at contacts that stick or are open all period, at normal gaps that stay closed, and at coordinates
-that no contact touches. With R these unknowns and A the others ``J_RR`` and ``J_RA`` are parts of D, one complex matrix a harmonic, so that
-``x_R = J_RR⁻¹ (b_R - J_RA x_A)`` costs little, and ``S = J_AA - J_AR J_RR⁻¹ J_RA`` is left. Nothing is assumed: what rests is read from the derivatives at each
-motion, and the solution is that of the whole array to rounding. At one frequency what is made of D serves as long as the same forces rest.
+``J = D + Bᵀ L B``: L contains the derivatives of the contact forces that depend on other harmonics, and D all other
+terms; D is block-diagonal. An equation without a force in L contains only its own harmonic. This holds at contacts that
+stick or are open throughout the period, at normal gaps that stay closed, and at coordinates without contacts. With R
+these unknowns and A the others, ``J_RR`` and ``J_RA`` are parts of D, one complex matrix per harmonic. Thus
+``x_R = J_RR⁻¹ (b_R - J_RA x_A)`` costs little, and ``S = J_AA - J_AR J_RR⁻¹ J_RA`` remains to be solved. The uncoupled
+forces are identified from the derivatives at each motion, and the solution equals the one of the full array to
+rounding. At one frequency, the elimination of D is reused while the same forces stay uncoupled.
 """
 
 from dataclasses import dataclass
@@ -24,14 +26,14 @@ from stickslip.operators import Elimination
 
 Entries = FloatArray | ComplexArray
 
-ROUNDING = 1e-13  # share of a contact's largest derivative below which nothing is coupled
-SINGULAR = 1e-12  # smallest pivot over largest below which a harmonic is not eliminated ...
-GROWTH = 1e6  # ... nor where kept unknowns move eliminated ones, or entries grow, by more
+ROUNDING = 1e-13  # relative to a contact's largest derivative; smaller ones couple nothing
+SINGULAR = 1e-12  # ratio of smallest to largest pivot below which a harmonic is not eliminated ...
+GROWTH = 1e6  # ... nor if eliminated unknowns over kept ones, or entries of the matrix, grow by more than this
 
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Contact forces that depend on other harmonics (coupled forces), and the others; build it with `coupling`.
+    """Contact forces that depend on other harmonics (coupled forces), and uncoupled ones; build it with `coupling`.
 
     Attributes
     ----------
@@ -88,7 +90,7 @@ def coupling(blocks: FloatArray, rows: SparseRows, n: int) -> Coupling:
 
 @dataclass(frozen=True, eq=False)
 class _Harmonic:
-    """One harmonic: eliminated and kept coordinates, and the Schur complement of the first."""
+    """One harmonic: eliminated and kept coordinates, and the Schur complement of the eliminated ones."""
 
     rest: IntArray  # (r,)
     kept: IntArray  # (k,)
@@ -99,7 +101,7 @@ class _Harmonic:
     reduced: Entries  # (k, k) D_AA - D_AR D_RR⁻¹ D_RA
 
     def solve(self, right: ComplexArray, *, transposed: bool) -> ComplexArray:
-        """Solve with D_RR, or with the transpose of its real form, which is that of the conjugate transpose, for (r, j)."""
+        """Solve with D_RR, or with the transpose of its real form (the real form of D_RRᴴ), for (r, j)."""
         if not self.rest.size:
             return right
         if self.lu.dtype == float:
@@ -110,7 +112,7 @@ class _Harmonic:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of the real form of D_RR, which is a square but for the static harmonic."""
+        """Sign of the determinant of the real form of D_RR: always positive, except for the static harmonic."""
         if np.iscomplexobj(self.lu):
             return 1.0
         swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
@@ -119,7 +121,7 @@ class _Harmonic:
 
 
 def _eliminated(matrix: Entries, kept: BoolArray) -> _Harmonic:
-    """Eliminate the coordinates of a harmonic that are not `kept`; all are kept where that would lose digits."""
+    """Eliminate the coordinates of a harmonic that are not `kept`; none if that would lose accuracy."""
     rest, own = np.flatnonzero(~kept), np.flatnonzero(kept)
     found = _split(matrix, rest, own) if rest.size else None
     if found is None:
@@ -132,7 +134,7 @@ def _eliminated(matrix: Entries, kept: BoolArray) -> _Harmonic:
 def _split(matrix: Entries, rest: IntArray, own: IntArray) -> _Harmonic | None:
     real = matrix.dtype == float
     getrf, getrs = (lapack.dgetrf, lapack.dgetrs) if real else (lapack.zgetrf, lapack.zgetrs)
-    turned = matrix.T  # what is picked from it is turned back into Fortran order
+    turned = matrix.T  # columns picked from the transpose are back in Fortran order when transposed again
     below, beside = turned[rest], turned[own]
     lu, pivots, info = getrf(below[:, rest].T, overwrite_a=True)
     size = np.abs(lu.diagonal())
@@ -224,7 +226,10 @@ class Resting:
         return np.asfortranarray(out)
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the right side (size, j) of S from `right` (N, j), and ``J_RR⁻¹ b_R`` (N, j), zero for kept unknowns; see `Elimination`."""
+        """Return the right side (size, j) of S from `right` (N, j), and ``J_RR⁻¹ b_R`` (N, j).
+
+        The latter is zero for kept unknowns; see `Elimination`.
+        """
         q = to_complex(right.reshape(-1, self.n, right.shape[1]))
         inner = np.zeros_like(q)
         for x, b, own in zip(inner, q, self.harmonics, strict=True):
@@ -240,7 +245,7 @@ class Resting:
         return left[self.kept], solved
 
     def spread(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """Return all unknowns (N, j) from the kept ones (size, j), without load on the others."""
+        """Return all unknowns (N, j) from the kept ones (size, j), without right side for the eliminated ones."""
         out = np.zeros((self.n * (2 * len(self.harmonics) - 1), x.shape[1]))
         out[self.kept] = x
         q = to_complex(out.reshape(-1, self.n, x.shape[1]))

@@ -1,4 +1,4 @@
-"""Dynamic stiffness where every temporal harmonic has matrices of its own, complex and unsymmetric ones: the waves of a wheel.
+"""Dynamic stiffness of the waves of a wheel: complex, unsymmetric matrices for each temporal harmonic.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, section 3 and appendices 1, 2 and 5.
@@ -29,15 +29,16 @@ from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.tuned import TunedWheel
 
-MIN_CACHED_DOFS = 300  # dofs from which the eigenproblem of the interior takes much longer than reading the matrices
+MIN_CACHED_DOFS = 300  # dofs above which the eigenproblem of the interior takes much longer than hashing the matrices
 
 _last: "WeakKeyDictionary[Structure, tuple[bytes, CondensedStiffness]]" = WeakKeyDictionary()
 
 
 def condensed_once(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:
-    """Prepare the exact condensation as `condense` does; the last one of the same structure is reused if matrices and retained dofs are the same.
+    """Prepare the exact condensation as `condense` does, or reuse the last one.
 
-    A hash of the contents detects matrices that were changed in place.
+    It is reused if matrices and retained dofs are the same. A hash of the contents detects matrices that were changed
+    in place.
     """
     if structure.n < MIN_CACHED_DOFS or load.static.size != structure.n:
         return condense(structure, retained, load)
@@ -65,7 +66,7 @@ def _arrays(matrix: Matrix | None) -> tuple[np.ndarray, ...]:
     return (np.asarray(matrix),)
 
 
-ANY = 100  # harmonics for which a wheel with every wave is there
+ANY = 100  # harmonics for which a wheel with all wave numbers is set up
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +135,10 @@ class _Damped(Waves):
 
 @dataclass(frozen=True, eq=False)
 class TravellingStiffness:
-    """The waves of a wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
+    """The waves of a wheel and its load, condensed to the retained coordinates; build it with `condense_waves`.
 
-    The mean of a real motion feels the real part of the matrices. Aerodynamic coefficients that depend on the frequency are taken at that
-    of each harmonic; the mean feels their frozen form.
+    The mean of a real motion has the real part of the matrices. Aerodynamic coefficients that depend on the frequency
+    are taken at the frequency of each harmonic; the mean has their frozen form.
     """
 
     waves: Waves
@@ -145,12 +146,12 @@ class TravellingStiffness:
 
     @property
     def retained(self) -> IntArray:
-        """Dof indices that stay unknown."""
+        """Retained dofs, the unknowns."""
         return self.waves.near
 
     @property
     def interior(self) -> IntArray:
-        """Dof indices that are condensed."""
+        """Condensed dofs."""
         return self.waves.far
 
     @property
@@ -168,7 +169,7 @@ class TravellingStiffness:
 
     @property
     def most(self) -> int:
-        """Highest harmonic for which there is a wave."""
+        """Highest harmonic with a wave."""
         return len(self.waves.structures) - 1
 
     def load_at(self, _omega: float) -> HarmonicLoad:
@@ -224,7 +225,10 @@ class TravellingStiffness:
         return spread[dofs]
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
-        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J; aerodynamic stiffness stores none."""
+        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J.
+
+        Aerodynamic stiffness stores no energy.
+        """
         twice = []
         for h, x in enumerate(self.recover(omega, q)):
             stiffness, force = self.waves.structures[h].stiffness, self.waves.force_on(h)
@@ -243,7 +247,7 @@ class TravellingStiffness:
 
 @dataclass(frozen=True, eq=False)
 class CondensedWaves:
-    """The condensed matrices of the waves at one frequency, by their products."""
+    """The condensed matrices of the waves at one frequency, as products with vectors."""
 
     linear: TravellingStiffness
     omega: float
@@ -287,7 +291,7 @@ class CondensedWaves:
         return self._each(rows, lambda wave, q: wave.stiffness @ q)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
+        """Return the product of the `rows` with the transpose of the real form of Z, which is the real form of Zᴴ."""
         return self._each(rows, lambda wave, q: (q.conj() @ wave.stiffness).conj())
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -307,15 +311,16 @@ class CondensedWaves:
 def condense_side(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
     """Prepare the exact condensation of a linear side, for harmonics up to `order`.
 
-    An unreduced structure is not condensed (`keep_all`). If all harmonics vibrate as one real symmetric structure, `condense` condenses it, at the cost of
-    few products a frequency, or `condense_mistuned` a wheel of sectors; `condense_waves` condenses all others.
+    An unreduced structure is not condensed (`keep_all`). If all harmonics have one real symmetric structure, `condense`
+    needs only a few products per frequency; `condense_mistuned` serves a wheel of sectors, and `condense_waves` all
+    other sides.
     """
     if isinstance(side, Unreduced) and side.n >= LEAST_SPARSE:
         return keep_all(side.structure, load)
     if isinstance(side, MistunedWheel) and by_sectors(side, retained):
         return condense_mistuned(side, retained, load)
     if isinstance(side, TunedWheel) and side.has_every_wave:
-        order = max(order, ANY)  # a wave is condensed when a harmonic first asks for it
+        order = max(order, ANY)  # each wave is condensed only when its harmonic is first needed
     structures = tuple(side.of_harmonic(h) for h in range(order + 1))
     feedback = tuple(side.feedback_of(h) for h in range(order + 1))
     one, still = structures[0], all(force is None for force in feedback)

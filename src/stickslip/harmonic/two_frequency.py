@@ -1,8 +1,9 @@
 """Harmonic balance of motions with two frequencies: ``q(t) = Re Σ Q_jk e^{i(jω1 + kω2)t}``, with the static term.
 
-Each combined frequency has its own condensed dynamic stiffness; contacts are marched along characteristics of the torus
-(`stickslip.harmonic.two_frequency_path`), and their derivatives with them, so that the Jacobian is that of the equations that are solved. It has the
-parts of that of a harmonic balance, combined frequencies in place of harmonics, and is kept by them where that costs less.
+Each combined frequency has its own condensed dynamic stiffness. Contacts and their derivatives are marched along
+characteristics of the torus (`stickslip.harmonic.two_frequency_path`), so that the Jacobian is exact for the discrete
+equations. It has the structure of a harmonic-balance Jacobian, with combined frequencies in place of harmonics, and is
+kept as products where that costs less.
 """
 
 from collections.abc import Mapping
@@ -25,7 +26,7 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.two_frequency_path import Indices, TorusPath, half_plane, torus_basis, torus_rates
 
-MAX_DENSE_UNKNOWNS = 4000  # of a dense Jacobian: 128 MB
+MAX_DENSE_UNKNOWNS = 4000  # largest size of a dense Jacobian: 128 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +36,10 @@ class TorusSide:
     Parameters
     ----------
     first, second
-        Dynamic stiffness with the loads of either frequency; the static load is that of `first`.
+        Dynamic stiffness with the loads of each frequency; the static load is part of `first`.
     waves
-        Wave numbers of both frequencies and number of sectors of a tuned wheel; None: one structure for all frequencies.
+        Wave numbers of both frequencies and number of sectors of a tuned wheel; None: one structure for all
+        frequencies.
     still
         Dynamic stiffness without a load, by wave number modulo the sectors; 0 for one structure.
     """
@@ -71,7 +73,8 @@ class TorusSide:
         omegas
             ω1 and ω2, rad/s.
         rate
-            Rate, 1/s, times which the mass is subtracted from the damping at all combined frequencies with the second one.
+            Rate of a mass-proportional damping, 1/s, which is subtracted at all combined frequencies that contain the
+            second one.
         """
         return _stiffness(self, indices, omegas, rate)
 
@@ -88,7 +91,7 @@ class TorusSide:
         return out[0], out[1], out[2]
 
     def recover(self, indices: Indices, omegas: tuple[float, float], q: ComplexArray) -> ComplexArray:
-        """Return the (len, n_all) motion of all dofs from that of the retained coordinates (len, n)."""
+        """Return the (len, n_all) motion of all dofs from the motion of the retained coordinates (len, n)."""
         top = max(max(abs(j), abs(k)) for j, k in indices)
         own: list[ComplexArray | None] = [None] * len(indices)
         for linear, omega, places in (
@@ -114,7 +117,7 @@ class TorusSide:
 
 @dataclass(frozen=True, eq=False)
 class CombinedProducts:
-    """Products with one matrix for each combined frequency: `StiffnessProducts` whose harmonics are the positions of combined frequencies.
+    """Products with one matrix per combined frequency; their harmonics are positions of combined frequencies.
 
     Parameters
     ----------
@@ -143,7 +146,7 @@ class CombinedProducts:
         return to_real((self.stiffness @ to_complex(rows)[:, :, None])[..., 0])
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, the real form of the conjugate transpose."""
+        """Return the product of the `rows` with the transpose of the real form of Z, which is the real form of Zᴴ."""
         return to_real((to_complex(rows).conj()[:, None, :] @ self.stiffness)[:, 0].conj())
 
     def block(self, harmonic: int) -> ComplexArray:
@@ -166,7 +169,7 @@ class TorusForces:
     rates
         Whether a force depends on velocity.
     unsettled
-        Number of contacts whose state did not repeat on a characteristic.
+        Number of contacts whose state did not become periodic on a characteristic.
     """
 
     coefficients: FloatArray
@@ -194,9 +197,10 @@ class TorusLinearisation:
 
 @dataclass(frozen=True, eq=False)
 class TorusBalance:
-    """The problem of two frequencies; `torus_balance` makes one.
+    """The periodic problem of two frequencies; build it with `torus_balance`.
 
-    Unknowns are the real coefficients of each index, index-major: ``[Q_00, C_10, S_10, ...]`` with ``Q = C - iS``, over `displacement_scale`.
+    Unknowns are the real coefficients of each index, index-major: ``[Q_00, C_10, S_10, ...]`` with ``Q = C - iS``, over
+    `displacement_scale`.
     """
 
     side: TorusSide
@@ -222,7 +226,7 @@ class TorusBalance:
 
     @property
     def n_rows(self) -> int:
-        """Real coefficients a coordinate."""
+        """Number of real coefficients per coordinate."""
         return 2 * len(self.indices) - 1
 
     @property
@@ -240,11 +244,11 @@ class TorusBalance:
 
     def with_indices(self, indices: Indices) -> "TorusBalance":
         """Return the same problem with other combined frequencies."""
-        # rows of its own: they tell a solver which Jacobians can share a preconditioner
+        # a new `SparseRows` object: solvers share preconditioners between Jacobians with the same one
         return replace(self, indices=indices, rows=replace(self.rows))
 
     def from_other(self, other: "TorusBalance", x: FloatArray) -> FloatArray:
-        """Return the unknowns of a motion that was found with other indices."""
+        """Return the unknowns of a motion that was computed with other indices."""
         known = dict(zip(other.indices, other.coefficients(x), strict=True))
         none = np.zeros(self.side.n, dtype=complex)
         return self.unknowns(np.array([known.get(index, none) for index in self.indices]))
@@ -310,9 +314,9 @@ class TorusBalance:
         )
 
     def left_out(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, more: Indices) -> ComplexArray:
-        """Return the (len(more), n) motion, m, that the contact forces at neglected combined frequencies would cause; 0 at (0, 0).
+        """Return the (len(more), n) motion, m, due to contact forces at neglected combined frequencies; 0 at (0, 0).
 
-        Contacts have the same stiffness for it as for the first frequency.
+        The contact stiffness is taken from the first frequency.
         """
         forces = self.forces(x, omegas, path, more)
         out = np.zeros((2 * len(more) - 1, self.side.n))
@@ -329,14 +333,14 @@ class TorusBalance:
         return moved
 
     def by_damping(self, x: FloatArray, omegas: tuple[float, float], rate: float, step: float) -> FloatArray:
-        """Return the derivative of the residual by `rate`, a central difference of the linear side."""
+        """Return the derivative of the residual by `rate`, by a central difference of the linear side."""
         q = self.coefficients(x)[:, :, None]
         ends = [self.side.stiffness(self.indices, omegas, rate + s)[0] for s in (-step, step)]
         change = ((ends[1] - ends[0]) @ q)[..., 0] / (2.0 * step)
         return np.asarray(to_real(change).reshape(-1) / self.force_scale)
 
     def _by_rate(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath, place: int) -> FloatArray:
-        """Return the derivative of the coefficients of the contact forces by a frequency, where they depend on velocity."""
+        """Return the derivative of contact-force coefficients by a frequency, for forces that depend on velocity."""
         step = 1e-5 * omegas[place]
         ends = []
         for sign in (-1.0, 1.0):
@@ -401,7 +405,10 @@ def torus_balance(side: TorusSide, interface: Interface, order: int) -> TorusBal
 def _marched(
     laws: MarchedLaws, gaps: FloatArray, tables: tuple[FloatArray, FloatArray], omega: float, pairs: int
 ) -> tuple[FloatArray, FloatArray, int, bool]:
-    """March contacts of one law class along a characteristic; return forces, blocks, how many did not settle, and whether velocity counts."""
+    """March contacts of one law class along a characteristic.
+
+    Return forces, blocks, the number of contacts that did not settle, and whether a force depends on velocity.
+    """
     basis, rates = tables
     own = gaps[:, laws.contacts]
     n, samples = own.shape[1], len(basis)
@@ -441,7 +448,7 @@ def _analysed(force: FloatArray, basis: FloatArray) -> FloatArray:
 def _stiffness(
     side: TorusSide, indices: Indices, omegas: tuple[float, float], rate: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return `TorusSide.stiffness`, cached, since a Newton iteration at fixed frequencies needs it at every step."""
+    """Return `TorusSide.stiffness`, cached: a Newton iteration at fixed frequencies needs it at every step."""
     values = np.zeros((len(indices), side.n, side.n), dtype=complex)
     slopes = np.zeros_like(values)
     values[0] = side.first.condensed(omegas[0], 0).stiffness[0]
@@ -450,7 +457,7 @@ def _stiffness(
         if place == 0:
             continue
         omega = j * omegas[0] + k * omegas[1]
-        # a frequency below zero is the conjugate of one above that travels the other way
+        # a negative frequency is the conjugate of a positive one that travels in the opposite direction
         wave = side.wave(j, k) if omega >= 0.0 else side.wave(-j, -k)
         linear = side.still[wave]
         if k != 0 and rate != 0.0:

@@ -1,9 +1,9 @@
-"""Sampling of a torus of two phases along paths on which both phases grow, closed after whole turns of both.
+"""Sampling of a torus of two phases along closed characteristics.
 
-A contact remembers along time, and time moves both phases at once: it goes around the torus on a characteristic,
-``θ1 = ω1 t, θ2 = ω2 t + φ``. With a ratio of whole numbers q / p in place of ``ω2 / ω1`` a characteristic closes after p turns of the first phase
-and q of the second. Samples on it are then those of one long period: the state of a contact is marched along them, and nothing has to
-be interpolated. Where few turns close already, several characteristics lie beside each other.
+Contacts have memory, and time advances both phases at once, along the characteristic ``θ1 = ω1 t, θ2 = ω2 t + φ``. If
+``ω2 / ω1`` is approximated by a ratio of integers q / p, a characteristic closes after p turns of the first phase and q
+of the second. Its samples are those of one long period: the contact state is marched along them without interpolation.
+If it closes after only a few turns, several parallel characteristics are used.
 """
 
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ from stickslip.errors import input_error
 Indices = tuple[tuple[int, int], ...]  # (0, 0) first, then one of each pair (j, k), (-j, -k)
 
 TURNS_A_HARMONIC, LEAST_TURNS = 4, 24
-SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # a turn of the faster phase
-SLIP = 2e-3  # rad a turn by which the second phase may be off: ten times as much changes forces by some thousandths
-EXACT = 1e-6  # rad a turn: a ratio that is so near to one of whole numbers is one
-LONG = 4  # times the usual number of turns, in a path through all of a slow beat
+SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # per turn of the faster phase
+SLIP = 2e-3  # largest error of the second phase, rad per turn: an error ten times as large changes forces by some thousandths
+EXACT = 1e-6  # rad per turn: below this error, a ratio counts as a ratio of integers
+LONG = 4  # times the usual number of turns, for a path through a whole slow beat
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TorusPath:
 
     @property
     def ratio(self) -> float:
-        """Rational approximation of ω2 / ω1 in the contacts."""
+        """Rational approximation of ω2 / ω1 for the contacts."""
         return self.turns[1] / self.turns[0]
 
     def phases(self, way: int) -> tuple[FloatArray, FloatArray]:
@@ -54,7 +54,7 @@ class TorusPath:
         return self.turns[0] * along, self.turns[1] * along + offset
 
     def slip(self, ratio: float) -> float:
-        """Return the error of the second phase after a turn of the first, rad."""
+        """Return the error of the second phase per turn of the first, rad."""
         return 2.0 * np.pi * abs(ratio - self.ratio)
 
 
@@ -99,10 +99,10 @@ def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
 
 
 def _through_beat(ratio: float, least: int) -> tuple[int, int]:
-    """Return the turns of one characteristic for a ratio near one of small numbers, the nearest of those with enough turns.
+    """Return the turns of one long characteristic for a ratio close to a ratio of small integers.
 
-    Characteristics beside each other would each have sliders of their own; those that stick in a part of the beat keep what they were left
-    with in another part.
+    Parallel characteristics would have separate sliders, but a slider that sticks in one part of the beat keeps the
+    state from another part. Thus one characteristic must pass through the whole beat.
     """
     turns = range(least, LONG * least)
     choices = [(p, q) for p in turns for q in {max(1, int(ratio * p)), int(ratio * p) + 1} if gcd(p, q) == 1]
@@ -121,7 +121,7 @@ def torus_basis(path: TorusPath, indices: Indices, way: int) -> FloatArray:
 
 
 def torus_rates(basis: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """Return the time derivative of a basis whose functions have the `frequencies` (one an index, rad/s)."""
+    """Return the time derivative of a basis whose functions have the `frequencies` (one per index, rad/s)."""
     rates = np.zeros_like(basis)
     rates[:, 1::2] = -frequencies[1:] * basis[:, 2::2]
     rates[:, 2::2] = frequencies[1:] * basis[:, 1::2]

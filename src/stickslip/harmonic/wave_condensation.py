@@ -1,8 +1,8 @@
 """One wave of a wheel condensed to the retained coordinates, at any frequency.
 
-Where stiffness and mass are Hermitian and the interior's modes decouple the damping, the interior is written once in these modes, and a
-frequency costs products (`ModalWave`; Krack et al. 2017, app. 5). All others, complex and unsymmetric ones, are solved at each frequency
-(`SolvedWave`).
+If stiffness and mass are Hermitian and the interior modes decouple the damping, the interior is transformed once to
+these modes, and each frequency costs only products (`ModalWave`; Krack et al. 2017, app. 5). All other waves, complex
+and unsymmetric, are solved at each frequency (`SolvedWave`).
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ from stickslip.reduction.aerodynamics import Feedback
 
 Array = FloatArray | ComplexArray
 Four = tuple[Array, Array, Array, Array]  # of stiffness, damping, mass and structural damping
-LARGEST_MODAL = 1500  # interior coordinates; beyond, the modes cost more than solving at dozens of frequencies
-HELD = 1e-12  # smallest eigenvalue of the scaled interior stiffness, below which its modes lose their digits
-DIAGONAL = 1e-10  # off-diagonal damping below this share of the largest counts as none
+LARGEST_MODAL = 1500  # interior coordinates; above, the modes cost more than direct solutions at dozens of frequencies
+HELD = 1e-12  # smallest eigenvalue of the scaled interior stiffness for which its modes are accurate
+DIAGONAL = 1e-10  # largest share of off-diagonal damping that still counts as none
 
 
 class WaveAt(Protocol):
@@ -44,7 +44,10 @@ class WaveAt(Protocol):
         ...
 
     def inside(self, q: Array, far: Array) -> ComplexArray:
-        """Return the (l,) displacements of the interior from the retained ones `q` (n,) and the load (l,) on it; (l, k) from (n, k) and (l, k)."""
+        """Return the (l,) displacements of the interior from the retained ones `q` (n,) and the interior load (l,).
+
+        From (n, k) and (l, k), return (l, k).
+        """
         ...
 
 
@@ -99,7 +102,7 @@ class _SolvedAt:
 
     @cached_property
     def _follows(self) -> Array:
-        """(l, n) displacements of the interior, sign turned round, under displacements of the retained dofs."""
+        """(l, n) displacements of the interior, with reversed sign, due to displacements of the retained dofs."""
         return self._solve(self.D[2])
 
     @cached_property
@@ -178,7 +181,7 @@ class _ModalAt:
 
     @cached_property
     def _weights(self) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """``v / d``, ``v² / d`` with ``v = p (κ + p)`` and ``d`` of the interior, and their derivatives by s."""
+        """``v / d``, ``v² / d`` with ``v = p (κ + p)`` and the interior stiffness ``d``, and their derivatives by s."""
         wave, p = self.wave, 1j * self.s
         v, v_slope = p * (wave.ratio + p), wave.ratio + 2 * p
         d = 1 + p * wave.damping + p**2 * wave.mass + 1j * (self.s != 0) * wave.loss
@@ -232,7 +235,7 @@ def condense_wave(
     near, far
         Retained and condensed dofs.
     mean
-        Whether the wave is the mean of a real motion, which has the real part of the matrices and the frequency zero.
+        Whether the wave is the mean of a real motion, with the real part of the matrices and zero frequency.
     feedback
         Aerodynamic force on the wave, whose frozen form is in the structure; None: no force.
     """
@@ -247,7 +250,7 @@ def condense_wave(
 
 
 def _in_modes(matrices: Four, near: IntArray, far: IntArray) -> ModalWave | None:
-    """Return the wave in modes of its interior; None where these do not decouple it."""
+    """Return the wave in modes of its interior; None if these do not decouple it."""
     blocks = [_blocks(matrix, near, far) for matrix in matrices]
     modes = _interior_modes(blocks[0][3], blocks[2][3])
     if modes is None:
@@ -274,7 +277,7 @@ def _in_modes(matrices: Four, near: IntArray, far: IntArray) -> ModalWave | None
 
 
 def _interior_modes(stiffness: Array, mass: Array) -> Array | None:
-    """Return the undamped modes of unit stiffness; None where the interior is not held."""
+    """Return the undamped modes of unit stiffness; None if the interior can move freely."""
     size = np.sqrt(np.maximum(np.abs(np.diagonal(stiffness)), np.finfo(float).tiny))
     try:
         if np.linalg.eigvalsh(stiffness / np.outer(size, size))[0] <= HELD:

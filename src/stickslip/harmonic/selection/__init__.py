@@ -1,4 +1,4 @@
-"""Strategies of harmonic selection, one a file; their names are in `stickslip.harmonic.strategies`."""
+"""Strategies of harmonic selection, one per file; their names are in `stickslip.harmonic.strategies`."""
 
 from functools import cache
 from importlib import import_module
@@ -9,7 +9,9 @@ from stickslip.harmonic.strategies import STRATEGIES
 
 
 def strategy_named(name: str, threshold: float | None = None, **options: bool) -> Strategy:
-    """Return a strategy with its default parameters, except for threshold and options; its module is imported at first use.
+    """Return the strategy with a name; threshold and options replace its defaults.
+
+    The module of the strategy is imported at first use.
 
     Parameters
     ----------

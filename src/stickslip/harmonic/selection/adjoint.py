@@ -1,10 +1,11 @@
 """Effect of each missing harmonic on the outputs: residuals weighted by the adjoints of the outputs.
 
-R. Becker and R. Rannacher, "An optimal control approach to a posteriori error estimation in finite element methods", Acta Numerica 10
-(2001) 1-102, sections 2 and 6, applied to harmonics in place of elements. The padded solution q of few harmonics leaves a residual r̃ in
-the missing ones alone. With the adjoint ``Jᵀ z = ∂y/∂q`` of an output y, its change by all missing harmonics is ``-Σ_h z_hᵀ r̃_h``. With the
-Jacobian at q this is the step of the Jacobian Alert, right to second order in the change; with the mean of the Jacobians at q and at the end
-of that step (the trapezoidal rule on the way) to third.
+R. Becker and R. Rannacher, "An optimal control approach to a posteriori error estimation in finite element methods",
+Acta Numerica 10 (2001) 1-102, sections 2 and 6, applied to harmonics in place of elements. The padded low-order
+solution q leaves a residual r̃ only in the missing harmonics. With the adjoint ``Jᵀ z = ∂y/∂q`` of an output y, the
+missing harmonics change it by ``-Σ_h z_hᵀ r̃_h``. With the Jacobian at q this is the step of the Jacobian Alert,
+accurate to second order in the change. With the mean of the Jacobians at q and at the end of that step (trapezoidal
+rule), it is accurate to third order.
 """
 
 from dataclasses import dataclass, replace
@@ -25,23 +26,25 @@ from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.model.blas_threads import threads_for
 
 Goal = Literal["motion", "amplitude"]
-SINGULAR = 1e-15  # smallest pivot over largest below which a Jacobian has no usable factors
-DOUBTFUL = 0.3  # distance of two changes over the later one above which a third one is asked for
+SINGULAR = 1e-15  # ratio of smallest to largest pivot below which factors are unusable
+DOUBTFUL = 0.3  # relative difference of two estimated changes above which a third one is computed
 MAX_FULL_EVALUATIONS = 3  # evaluations with all harmonics
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """Harmonics of dofs, one after the other, whose relative changes ``Δy / y`` make the error.
+    """Harmonics of dofs whose relative changes ``Δy / y`` define the error.
 
-    Their real parts are, to first order, relative changes of the amplitudes, and their imaginary parts changes of the phases in rad.
+    The real parts are, to first order, relative changes of the amplitudes, the imaginary parts changes of the phases in
+    rad.
 
     Attributes
     ----------
     harmonics, dofs
         (k,) harmonic and dof of each output.
     motion
-        (k,) reference of relative changes, m: the complex displacement, or the larger reference of the measure with the same phase.
+        (k,) reference of relative changes, m: the complex displacement, or the measure's reference with the same phase,
+        if larger.
     goal
         ``motion``: relative changes are complex; ``amplitude``: only their real parts count.
     """
@@ -78,7 +81,7 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
     """
     scales = measure.scales(before, len(before))
     motion = before[scales.harmonics[:, None], measure.dofs]
-    turn = np.exp(1j * np.angle(motion))  # what a change is relative to has the phase of the motion
+    turn = np.exp(1j * np.angle(motion))  # the reference of a change has the phase of the motion
     row, column = np.nonzero(scales.size > 0.0)
     harmonics, dofs = scales.harmonics[row], measure.dofs[column]
     return Outputs(harmonics, dofs, (scales.size * turn)[row, column], goal)
@@ -86,7 +89,7 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """A Jacobian and its LU factors, for the system and the transposed one; for a Jacobian known by its products, a solver."""
+    """A Jacobian and its LU factors, or a solver if it is known by its products."""
 
     jac: FloatArray | StructuredJacobian
     factors: tuple[FloatArray, IntArray] | None
@@ -138,18 +141,19 @@ def mean_jacobian(
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimated changes of the outputs by the missing harmonics, relative to their amplitudes; infinite if a Jacobian is singular.
+    """Estimated relative changes of the outputs by the missing harmonics; infinite if a Jacobian is singular.
 
     Attributes
     ----------
     changes
-        (k,) complex changes of the outputs: by the Jacobian at the solution, which is what the Jacobian Alert predicts, and by mean Jacobians.
+        (k,) complex changes of the outputs, one array per estimate: first with the Jacobian at the solution, as the
+        Jacobian Alert predicts, then with mean Jacobians.
     start
-        Scaled unknowns of the reference at the end of the last step.
+        Scaled unknowns of the reference after the last step.
     residual
         Scaled residual r̃ of the padded solution.
     mean
-        The last mean Jacobian; None if nothing acts on the missing harmonics, or if it is singular.
+        The last mean Jacobian; None if no force acts on the missing harmonics, or if it is singular.
     """
 
     changes: tuple[ComplexArray, ...]
@@ -164,17 +168,17 @@ class Estimate:
 
     @property
     def errors(self) -> FloatArray:
-        """(k,) largest relative error to be expected of each output: the larger of the last estimate and the alert."""
+        """(k,) largest expected relative error of each output: the larger one of the last estimate and the Jacobian Alert."""
         return np.maximum(np.abs(self.changes[0]), np.abs(self.changes[-1]))
 
     @property
     def bound(self) -> float:
-        """Largest relative error to be expected, at least the prediction of the Jacobian Alert."""
+        """Largest expected relative error, at least the prediction of the Jacobian Alert."""
         return float(np.max(self.errors, initial=0.0))
 
     @property
     def doubt(self) -> float:
-        """Largest difference of two successive estimates over the last one: far below 1 if they agree."""
+        """Largest relative difference of two successive estimates: far below 1 if they agree."""
         if self.mean is None:
             return 0.0 if self.bound == 0.0 else np.inf
         return max(_away(one, other, self.changes[-1]) for one, other in pairwise(self.changes))
@@ -194,10 +198,10 @@ def estimate(
     solve: Solve | None = None,
     events: Events | None = None,
 ) -> Estimate:
-    """Estimate the error that the missing harmonics make in the outputs of a low-order solution.
+    """Estimate the error of the outputs of a low-order solution due to missing harmonics.
 
-    Two evaluations of the problem with all harmonics, at the padded solution and one Newton step from there; a third one, at the end of the
-    second step, where the first two steps differ by more than `DOUBTFUL`.
+    The problem with all harmonics is evaluated at the padded solution and one Newton step from there. If the first two
+    steps differ by more than `DOUBTFUL`, a third evaluation follows at the end of the second step.
 
     Parameters
     ----------
@@ -240,10 +244,10 @@ def estimate(
 def contributions(
     low: HarmonicBalance, high: HarmonicBalance, omega: float, outputs: Outputs, found: Estimate
 ) -> ComplexArray:
-    """Return the (k, n_missing) parts of the missing harmonics in the last changes of an estimate.
+    """Return the (k, n_missing) contributions of the missing harmonics to the last changes of an estimate.
 
-    Each output takes two transposed solves (one for the static part) with the factors of the estimate. A Jacobian
-    that is known by its products is solved for the residual of each missing harmonic instead, with the same result.
+    Each output takes two transposed solutions (one for the static part) with the factors of the estimate. A Jacobian
+    known by its products is solved for the residual of each missing harmonic instead, with the same result.
 
     Parameters
     ----------
@@ -281,7 +285,7 @@ def contributions(
 def _adjoints(
     high: HarmonicBalance, omega: float, outputs: Outputs, factors: tuple[FloatArray, IntArray]
 ) -> ComplexArray:
-    """Return z (size, k) of ``Jᵀ z = ∂y/∂x`` for the complex relative changes y of the outputs."""
+    """Return the adjoints z (size, k) of the complex relative changes y of the outputs, ``Jᵀ z = ∂y/∂x``."""
     k = outputs.dofs.size
     gradient = np.zeros((high.n_rows, high.linear.n, k), dtype=complex)
     for h in np.unique(outputs.harmonics):

@@ -1,4 +1,4 @@
-"""The prediction of the Jacobian Alert: how missing harmonics would change a solution (Gastaldi & Berruti 2017, section 4)."""
+"""Prediction of the Jacobian Alert: change of a solution by missing harmonics (Gastaldi & Berruti 2017, section 4)."""
 
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -15,7 +15,7 @@ from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 
 Form = Literal["newton", "published"]
-SILENCE = 1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
+SILENCE = 1e-12  # contact forces in the missing harmonics, as a share of the load, that count as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +53,11 @@ def jacobian_alert(
     form: Form = "newton",
     events: Events | None = None,
 ) -> Alert:
-    """Predict how the missing harmonics would change a low-order solution.
+    """Predict the change of a low-order solution by the missing harmonics.
 
-    One Newton step in the larger space from the padded solution, ``Δq = -J̃⁻¹ r̃(q)``. Where the contact forces are homogeneous of
-    degree one this equals the published ``J̃ (q + Δq) = F`` (eq. 21), since then ``r̃ = J̃ q - F``; with preloads in contacts, gaps or
-    smooth laws only the Newton form is right.
+    One Newton step in the larger space from the padded solution, ``Δq = -J̃⁻¹ r̃(q)``. If the contact forces are
+    homogeneous of degree one, this equals the published ``J̃ (q + Δq) = F`` (eq. 21), because ``r̃ = J̃ q - F``. With
+    preloads, gaps or smooth laws only the Newton form is right.
 
     Parameters
     ----------
@@ -70,12 +70,13 @@ def jacobian_alert(
     measure
         Dofs and harmonics over which the largest relative change is taken.
     solve
-        Function from the enlarged Jacobian and right side to the solution, None if there is none; by default LU. The published method
-        partitions the system by harmonics, as a Krylov method with factors of each harmonic does.
+        Function from the enlarged Jacobian and right side to the solution, None if there is none; by default LU. The
+        published method partitions the system by harmonics, as a Krylov method with factors of each harmonic does.
     form
         ``newton``, or ``published``: eq. 21 as it stands.
     events
-        Events of the contacts at the solution, if its evaluation found them (`Step.events`): then contacts are not evaluated again.
+        Events of the contacts at the solution, if its evaluation found them (`Step.events`): then contacts are not
+        evaluated again.
 
     Raises
     ------
@@ -112,8 +113,9 @@ def asked_again(
 ) -> Alert:
     """Evaluate the contacts at the predicted solution, and take one more Newton step from there.
 
-    The first step keeps the contact states of the low-order solution. If they change on the way, its error may be far too small; then the residual at
-    ``q + Δq`` and the second step are large. If they stay, the second step is of second order.
+    The first step keeps the contact states of the low-order solution. If they change, its error may be far too small;
+    then the residual at ``q + Δq`` and the second step are large. If they stay the same, the second step is of second
+    order.
 
     Parameters
     ----------
@@ -147,7 +149,7 @@ def led_to(
 
 
 def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
-    """Solve by LU factors; None where the matrix is singular."""
+    """Solve by LU factors; None if the matrix is singular."""
     try:
         return np.asarray(np.linalg.solve(jac if isinstance(jac, np.ndarray) else jac.dense(), right))
     except np.linalg.LinAlgError:
@@ -178,10 +180,10 @@ def drives_missing(low: HarmonicBalance, high: HarmonicBalance) -> bool:
 
 
 def silent(low: HarmonicBalance, high: HarmonicBalance, period: ContactPeriod) -> bool:
-    """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
+    """Whether no force acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
-    The enlarged residual repeats the low-order one, which is zero, in its rows; its other rows are loads and contact forces of
-    the missing harmonics.
+    In the rows of the low-order problem the enlarged residual is zero; the other rows contain loads and contact forces
+    of the missing harmonics.
     """
     if drives_missing(low, high):
         return False

@@ -1,4 +1,4 @@
-"""The same harmonics at every frequency: nothing is decided."""
+"""Strategies with the same harmonics at every frequency, which accept every solution."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,7 +10,7 @@ from stickslip.harmonic.selection.strategy import Kept, Step, Verdict
 
 @dataclass(frozen=True)
 class AlwaysLow:
-    """Keep the harmonics of the first passage; a frequency that does not converge is not repeated with more."""
+    """Keep the harmonics of the first passage; frequencies that do not converge are not repeated with more."""
 
     always: ClassVar[Kept] = "low"
     verifies: ClassVar[bool] = False

@@ -1,4 +1,4 @@
-"""Harmonics chosen one by one by their effect on the outputs: a goal-oriented error estimate (see `adjoint`)."""
+"""Choice of single harmonics by their effect on the outputs: a goal-oriented error estimate (see `adjoint`)."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, get_args
@@ -13,13 +13,13 @@ from stickslip.harmonic.selection.adjoint import Estimate, Goal, Outputs, contri
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 
-GOALS = 8  # outputs with the largest errors by which harmonics are chosen
-NEGLIGIBLE_CHANGE = 1e-6  # relative change that is no reason to keep a harmonic
+GOALS = 8  # outputs with the largest errors, which decide on the harmonics
+NEGLIGIBLE_CHANGE = 1e-6  # relative change below which a harmonic is not needed
 
 
 @dataclass(frozen=True)
 class GoalOriented:
-    """Repeat with the harmonics that the outputs need if the bound of their error exceeds a threshold.
+    """Repeat with the harmonics that the outputs need if their error bound exceeds a threshold.
 
     Parameters
     ----------
@@ -28,9 +28,11 @@ class GoalOriented:
     left_out
         Share of the threshold that the harmonics left out of a repeat may contribute in total, without cancellation.
     goal
-        Accurate quantity of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
+        Quantity of an output that must be accurate: its ``motion``, amplitude and phase as in the Jacobian Alert, or
+        only its ``amplitude``.
     guarded
-        Whether `GuardedAlert` checks solutions whose bound is below the threshold; at its alarm a frequency is repeated with all harmonics.
+        Whether `GuardedAlert` checks solutions whose bound is below the threshold. If it gives the alarm, the frequency
+        is repeated with all harmonics.
     """
 
     verifies: ClassVar[bool] = True
@@ -71,23 +73,23 @@ class GoalOriented:
         worst = np.argsort(-found.errors, kind="stable")[:GOALS]
         missing = tuple(h for h in high.harmonics if h not in low.harmonics)
         parts = contributions(low, high, step.omega, outputs.some(worst), found)
-        # parts add up in a linear problem: the farther this one is from one, the fewer are left out
+        # contributions add up only in a linear problem: the less linear this one is, the fewer are left out
         allowed = self.left_out * self.threshold * max(1.0 - found.doubt, 0.0)
         chosen = chosen_harmonics(parts, missing, max(allowed, NEGLIGIBLE_CHANGE))
         return tuple(sorted({*low.harmonics, *chosen}))
 
 
 def chosen_harmonics(parts: ComplexArray, missing: Harmonics, allowed: float) -> Harmonics:
-    """Return the missing harmonics with the largest parts, so many that the sum of the other parts is below a limit.
+    """Return the missing harmonics with the largest contributions, until the sum of the others is below a limit.
 
     Parameters
     ----------
     parts
         (k, n_missing) relative change of each output by each missing harmonic.
     missing
-        The harmonics.
+        The missing harmonics.
     allowed
-        Limit of the sum of magnitudes of the neglected parts of one output. At least one harmonic is chosen.
+        Limit of the sum of magnitudes of the neglected contributions to one output. At least one harmonic is chosen.
     """
     size = np.abs(parts)
     order = np.argsort(-size.max(axis=0), kind="stable")

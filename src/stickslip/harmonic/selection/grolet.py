@@ -1,4 +1,7 @@
-"""The tangent foretells the spectrum (A. Grolet and F. Thouverez, Mech. Syst. Signal Process. 30 (2012) 43-60)."""
+"""Selection of harmonics by the tangent prediction.
+
+A. Grolet and F. Thouverez, Mech. Syst. Signal Process. 30 (2012) 43-60.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,21 +17,22 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class Grolet:
-    """Keep at the next frequency the harmonics that have a share in the energy of its tangent prediction.
+    """Keep at the next frequency the harmonics with a sufficient share in the energy of its tangent prediction.
 
-    ``∂r/∂q Δq = -∂r/∂ω Δω`` in the space of all harmonics of the reference (Gastaldi & Berruti 2017, eq. 11, 12), then the share of
-    each harmonic in ``q + Δq``.
+    ``∂r/∂q Δq = -∂r/∂ω Δω`` is solved with all harmonics of the reference (Gastaldi & Berruti 2017, eq. 11, 12); then
+    the shares of the harmonics in ``q + Δq`` are compared with the threshold.
 
     Parameters
     ----------
     threshold
-        Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
-        the amplitude.
+        Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a
+        hundredth of the amplitude.
     per_dof
         Evaluate the shares of each retained coordinate, which then keeps its own harmonics, as in the source (section
         4.5.2.1); otherwise all coordinates keep the same harmonics.
     repeats
-        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does
+        not.
     """
 
     verifies: ClassVar[bool] = False
@@ -37,12 +41,15 @@ class Grolet:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Predict the next solution; this frequency is solved again only with `repeats`. The indicator is the largest share left out."""
+        """Predict the next solution; this frequency is solved again only with `repeats`.
+
+        The indicator is the largest neglected share.
+        """
         q = padded_solution(step)
         at = step.reference.linearise(q, step.omega)
         ahead = step.next_omega - step.omega
         change = (step.solve or solve_array)(at.jac, -ahead * at.jac_p)
-        if change is None:  # a fold: nothing can be foretold, all harmonics are kept
+        if change is None:  # at a fold there is no prediction, and all harmonics are kept
             return foretold(step, float("inf"), step.reference.harmonics, repeats=self.repeats)
         if self.per_dof:
             return self._judge_each(step, shares_by_dof(step.reference, q + change))
@@ -53,7 +60,7 @@ class Grolet:
         return foretold(step, max(missed, default=0.0), following, repeats=self.repeats)
 
     def _judge_each(self, step: Step, shares: FloatArray) -> Verdict:
-        """Choose what each coordinate keeps from the shares that are foretold for it."""
+        """Choose the harmonics of each coordinate from its predicted shares."""
         reference = step.reference.harmonics
         smallest = np.isin(reference, step.smallest)
         wanted = (shares > self.threshold) | smallest[:, None]

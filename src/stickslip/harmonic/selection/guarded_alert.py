@@ -1,16 +1,20 @@
-"""The Jacobian Alert with a second look: no prediction is believed before the contacts were asked at ``q + Δq``.
+"""The Jacobian Alert with a check: a prediction is accepted only after the contacts were evaluated at ``q + Δq``.
 
-The published alert (Gastaldi & Berruti 2017) takes the contact states of the low-order solution q for those of the true one. Where
-they change on the way, its one Newton step says little: in the blade-damper-blade benchmark it predicts 1.1 % where 7.3 % are true. Here a
-prediction above the threshold is an alarm as it was; one below it has to prove itself, by steps whose cost grows with the doubt:
+The published alert (Gastaldi & Berruti 2017) uses the contact states of the low-order solution q. If they change on the
+way to the true solution, its one Newton step is unreliable: in the blade-damper-blade benchmark it predicts 1.1 %
+instead of 7.3 %. Here a prediction above the threshold is an alarm as before. One below is checked in steps of
+increasing cost:
 
-1. Nothing acts on the missing harmonics, nor on any other of the judging set (`harmonic.judging`): silent, without a factorisation.
-2. The contacts are evaluated at ``q + Δq``, with twice the harmonics of the reference, and a chord step is taken with the factors that
-   are there: ``Δq₂ = -J̃⁻¹ (r̃(q + Δq) + K̃ₓ Δqₓ)``. The harmonics x beyond the reference are solved one by one,
-   ``Δqₓ = -(Z + K)ₓₓ⁻¹ rₓ``. A residual that fell, and a small ``|Δq₁| + 2 |Δq₂|``, prove the prediction.
-3. Newton's method goes on from there with twice the harmonics of the reference, and stops as soon as the answer is clear: the change
-   so far with what is left of it at the rate ``θ = |Δqₖ₊₁| / |Δqₖ|`` of two such steps, that is ``|q_k - q| + θ/(1-θ) |Δqₖ|``,
-   is below the threshold (after one step: as in 2), or the change is above it. What does not contract is an alarm.
+1. If no force acts on the missing harmonics, nor on any other of the judging set (`harmonic.judging`), it is accepted
+   without a factorisation.
+2. The contacts are evaluated at ``q + Δq``, with twice the harmonics of the reference, and a chord step is taken with
+   the existing factors: ``Δq₂ = -J̃⁻¹ (r̃(q + Δq) + K̃ₓ Δqₓ)``. The harmonics x beyond the reference are solved one by
+   one, ``Δqₓ = -(Z + K)ₓₓ⁻¹ rₓ``. If the residual decreases and ``|Δq₁| + 2 |Δq₂|`` is small, the prediction is
+   accepted.
+3. Newton's method continues from there with twice the harmonics of the reference until the decision is clear. With the
+   rate ``θ = |Δqₖ₊₁| / |Δqₖ|`` of two such steps, the estimated total change is ``|q_k - q| + θ/(1-θ) |Δqₖ|``. The
+   prediction is accepted if this is below the threshold (after one step: as in 2); it is an alarm if the change is
+   above it, or the steps do not contract.
 """
 
 from dataclasses import dataclass, replace
@@ -33,12 +37,14 @@ from stickslip.harmonic.selection.strategy import Solve, Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
 
 SAMPLES_A_HARMONIC = 8
-DOUBT = 2.0  # times the chord step that the true change may go beyond the prediction
+DOUBT = 2.0  # times the chord step: uncertainty of the prediction
 
 
 @dataclass(frozen=True)
 class GuardedAlert:
-    """Repeat with all harmonics of the reference if the error may exceed a threshold, also judged with the contact states after the step.
+    """Repeat with all harmonics of the reference if the error may exceed a threshold.
+
+    The prediction is checked with the contact states after the step.
 
     Parameters
     ----------
@@ -47,7 +53,8 @@ class GuardedAlert:
     quick
         Share of the threshold below which a prediction plus its uncertainty is accepted after the chord step.
     steps
-        Largest number of Newton steps with twice the harmonics of the reference; if the result is still unclear, the alarm is given.
+        Largest number of Newton steps with twice the harmonics of the reference; if the result is still unclear, the
+        alarm is given.
     """
 
     verifies: ClassVar[bool] = True
@@ -74,7 +81,7 @@ class GuardedAlert:
 
         alert = jacobian_alert(step.balance, high, step.x, step.omega, step.measure, solve, events=step.events)
         if not kept and not covers(step.balance, high):
-            # silent on harmonics that the reference has; what acts on the others of the judging set?
+            # no force on the harmonics of the reference; check the other harmonics of the judging set
             wide = judging_balance(step.balance, high.harmonics)
             alert = jacobian_alert(step.balance, wide, step.x, step.omega, step.measure, step.solve, events=step.events)
             known = covers(step.balance, wide)
@@ -92,7 +99,7 @@ class GuardedAlert:
     def _doubted(
         self, step: Step, factors: Factored, residual: float, predicted: float, start: FloatArray
     ) -> tuple[float, ComplexArray]:
-        """Return an error bound and the best start of a repeat, from the prediction ``q + Δq`` and the solution q."""
+        """Return an error bound and the best start of a repeat, from the prediction `start`."""
         high, omega = step.reference, step.omega
         beyond = doubled(high)
         at = high.linearise(start, omega)
@@ -126,9 +133,9 @@ class GuardedAlert:
             if moved > self.threshold:
                 return moved, beyond.coefficients(x)
             bound = moved + _left(size, before)
-            # the first step has none of its kind to be compared with
+            # the first step has no earlier one for a rate of contraction
             limit = self.threshold if k > 0 else self.quick * self.threshold
-            # outputs may stand still while contacts are on their way elsewhere
+            # outputs may stand still while the contacts still change
             length = float(np.linalg.norm(change))
             if bound <= limit and norm < first and length < whole:
                 return bound, beyond.coefficients(x)
@@ -137,7 +144,7 @@ class GuardedAlert:
 
 
 def _unbalanced(step: Step, beyond: HarmonicBalance, begin: FloatArray) -> float:
-    """Return the scaled residual that a solution leaves on the harmonics beyond the reference."""
+    """Return the scaled residual of a solution in the harmonics beyond the reference."""
     period = beyond.forces(begin, step.omega, step.events)
     force = np.zeros((beyond.n_rows, beyond.linear.n))
     beyond.rows.add_forces(period.coefficients, force)
@@ -146,7 +153,10 @@ def _unbalanced(step: Step, beyond: HarmonicBalance, begin: FloatArray) -> float
 
 
 def _left(size: float, before: float) -> float:
-    """Return the estimated remaining change of a sequence after a step: a geometric series, for the first step its uncertainty."""
+    """Return the estimated remaining change of a sequence after a step: a geometric series.
+
+    After the first step it is the uncertainty of that step.
+    """
     if np.isnan(before):
         return DOUBT * size
     if size >= before:
@@ -165,7 +175,10 @@ def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
 
 @lru_cache(maxsize=8)
 def doubled(reference: HarmonicBalance) -> HarmonicBalance:
-    """Return the same problem with harmonics up to twice the highest (limited by the waves of a tuned wheel), multiples of the common divisor of the kept ones."""
+    """Return the same problem with all multiples of the common divisor of its harmonics up to twice the highest.
+
+    The waves of a tuned wheel may limit the highest one.
+    """
     order = 2 * reference.order
     most = reference.linear.most
     order = order if most is None else min(order, most)
@@ -176,14 +189,14 @@ def doubled(reference: HarmonicBalance) -> HarmonicBalance:
 def truncated(
     high: HarmonicBalance, beyond: HarmonicBalance, period: ContactPeriod, omega: float, solve: Solve | None = None
 ) -> FloatArray:
-    """Return the contribution to the reference's scaled residual of harmonics that it leaves out, each solved alone.
+    """Return the contribution of neglected harmonics, each solved alone, to the scaled residual of the reference.
 
     Parameters
     ----------
     high, beyond
-        The reference and the same problem with all of its harmonics and more.
+        The reference, and the same problem with additional harmonics.
     period
-        Contacts with the harmonics of `beyond` at a motion that has those of `high` alone.
+        Contacts with the harmonics of `beyond` at a motion with the harmonics of `high`.
     omega
         Frequency, rad/s.
     solve
@@ -208,7 +221,7 @@ def _moved(
     force: FloatArray,
     solve: Solve | None,
 ) -> FloatArray:
-    """Return the rows (m, n) of the motion in the harmonics that the reference leaves out, m, under the contact forces (m, n)."""
+    """Return the motion (m, n), m, in the harmonics beyond the reference, under the contact forces (m, n)."""
     means = harmonic_means(period.blocks)
     moved = np.zeros_like(force)
     if beyond.structured and solve is not None:
@@ -224,6 +237,6 @@ def _moved(
         try:
             q = -solved(matrix, force[2 * place - 1] - 1j * force[2 * place])
         except np.linalg.LinAlgError:
-            continue  # a resonance without damping: the Newton steps that follow see it
+            continue  # a resonance without damping: the Newton steps that follow account for it
         moved[2 * place - 1], moved[2 * place] = q.real, -q.imag
     return moved

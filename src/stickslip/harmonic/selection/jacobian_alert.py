@@ -9,20 +9,20 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class JacobianAlert:
-    """Repeat with all harmonics of the reference where the predicted error exceeds a threshold.
+    """Repeat with all harmonics of the reference if the predicted error exceeds a threshold.
 
     Parameters
     ----------
     threshold
         Largest predicted error that is accepted, as a fraction.
     form
-        Prediction of the error: one ``newton`` step in the enlarged space, or eq. 21 as ``published``. They are equal if
-        contact forces are homogeneous of degree one.
+        Prediction of the error: one ``newton`` step in the enlarged space, or eq. 21 as ``published``. They are equal
+        if contact forces are homogeneous of degree one.
 
     Raises
     ------
     InputError
-        If there is no such form.
+        If the form is unknown.
     """
 
     verifies: ClassVar[bool] = True

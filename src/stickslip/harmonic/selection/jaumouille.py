@@ -1,4 +1,7 @@
-"""One harmonic more until the strain energy stays (V. Jaumouillé, J.-J. Sinou and B. Petitjean, J. Sound Vib. 329 (2010) 4048-4067)."""
+"""Increase of the order until the strain energy converges.
+
+V. Jaumouillé, J.-J. Sinou and B. Petitjean, J. Sound Vib. 329 (2010) 4048-4067.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,9 +14,10 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class Jaumouille:
-    """Solve every frequency with one harmonic more until the strain energy of the structure hardly changes.
+    """Add one harmonic at a time at every frequency until the strain energy of the structure hardly changes.
 
-    ``|E(nH) - E(nH + 1)| / E(nH)`` (Gastaldi & Berruti 2017, eq. 9), the energy mean over the period. Each frequency begins with the fewest harmonics.
+    The indicator is ``|E(nH) - E(nH + 1)| / E(nH)`` (Gastaldi & Berruti 2017, eq. 9), with the mean energy over the
+    period. Each frequency begins with the fewest harmonics.
 
     Parameters
     ----------
@@ -25,7 +29,7 @@ class Jaumouille:
     threshold: float = 0.01
 
     def judge(self, step: Step) -> Verdict:
-        """Ask for one harmonic more where there is nothing to compare with, or where the comparison fails."""
+        """Request one more harmonic if there is no solution to compare with, or the energy changes too much."""
         before = step.before
         if before is None:
             return Verdict(np.nan, raised(step), step.smallest)

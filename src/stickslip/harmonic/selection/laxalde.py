@@ -1,4 +1,7 @@
-"""Harmonics from the contact forces that they leave out (D. Laxalde, as reviewed by Gastaldi & Berruti 2017, section 3)."""
+"""Selection of harmonics by the truncation error of the contact forces.
+
+D. Laxalde, as reviewed by Gastaldi & Berruti 2017, section 3.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,15 +18,17 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 class Laxalde:
     """Keep enough harmonics at the next frequency to represent the contact forces of this one.
 
-    The error of ``nH`` harmonics is the mean over the period of the absolute residue of the contact forces in the time domain,
-    summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to the residue of the static term.
+    The error of ``nH`` harmonics is the truncation error of the contact forces in the time domain, its absolute value
+    averaged over the period and summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to the error
+    of the static term alone.
 
     Parameters
     ----------
     threshold
         Largest error of the forces that is accepted, a fraction; the review gives no number.
     repeats
-        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does
+        not.
     """
 
     verifies: ClassVar[bool] = False
@@ -41,7 +46,7 @@ class Laxalde:
 
 
 def left_out(step: Step) -> FloatArray:
-    """Return the residue of the contact forces for each highest harmonic of the reference, relative to the residue of the static term."""
+    """Return the truncation error of the contact forces for each order, relative to the error of the static term."""
     period = contacts_of_reference(step)
     force = period.force.reshape(-1, period.force.shape[2])
     turn = np.exp(2j * np.pi * np.arange(force.shape[1]) / force.shape[1])
@@ -50,6 +55,6 @@ def left_out(step: Step) -> FloatArray:
     for h in step.reference.harmonics:
         rest = rest - np.real(parts[h][:, None] * turn**h)
         left.append(float(np.mean(np.abs(rest), axis=1).sum()))
-    # forces that do not vibrate are represented by the static term
+    # constant forces are represented exactly by the static term
     silent = left[0] <= np.finfo(float).eps * float(np.abs(force).sum())
     return np.zeros(len(left)) if silent else np.array(left) / left[0]

@@ -1,4 +1,7 @@
-"""More harmonics while the last one holds energy (R.C. Maple, P.I. King, P.D. Orkwis and J.M. Wolff, J. Comput. Phys. 193 (2004) 620-641)."""
+"""Increase of the order by the energy of the last harmonic.
+
+R.C. Maple, P.I. King, P.D. Orkwis and J.M. Wolff, J. Comput. Phys. 193 (2004) 620-641.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,19 +15,19 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class Maple:
-    """Solve a frequency with one harmonic more while the last one has too large a share of the spectral energy.
+    """Add one harmonic at a frequency as long as the last one has too large a share of the spectral energy.
 
-    The share is that of Gastaldi & Berruti 2017, eq. 10. Harmonics that were needed are kept at the next frequency; none is ever
-    dropped.
+    The share is defined by eq. 10 of Gastaldi & Berruti 2017. Added harmonics are kept at the next frequencies; none is
+    ever dropped.
 
     Parameters
     ----------
     threshold
-        Largest share of the last harmonic that is accepted, of the square of the motion; the review gives no number: 1e-4 is a
+        Largest accepted share of the last harmonic in the square of the motion; the review gives no number: 1e-4 is a
         hundredth of the amplitude.
     per_dof
-        Check the last harmonic of each retained coordinate, and raise only the coordinates that need it, as in the source (section
-        4.5.2.1); otherwise all coordinates keep the same harmonics.
+        Check the last harmonic of each retained coordinate, and add harmonics only where needed, as in the source
+        (section 4.5.2.1); otherwise all coordinates keep the same harmonics.
     """
 
     verifies: ClassVar[bool] = False
@@ -32,7 +35,7 @@ class Maple:
     per_dof: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Compare the energy of the last harmonic with that of all."""
+        """Compare the energy of the last harmonic with the total energy."""
         if self.per_dof:
             return self._judge_each(step)
         share = float(spectral_shares(step.balance, step.x)[-1])
@@ -40,7 +43,7 @@ class Maple:
         return Verdict(share, again, step.balance.harmonics)
 
     def _judge_each(self, step: Step) -> Verdict:
-        """Compare the last harmonic of each coordinate with all that it has."""
+        """Compare the energy of the last harmonic of each coordinate with its total energy."""
         shares = shares_by_dof(step.balance, step.x)
         place = {h: i for i, h in enumerate(step.balance.harmonics)}
         own = step.supports

@@ -1,4 +1,4 @@
-"""Similarity of two Jacobians, and strength of the coupling of harmonics (Gastaldi & Berruti 2017, sections 4.1 and 6.2)."""
+"""Similarity of two Jacobians, and coupling between harmonics (Gastaldi & Berruti 2017, sections 4.1 and 6.2)."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +13,7 @@ from stickslip.harmonic.harmonic_set import Harmonics
 from stickslip.harmonic.structured import real_matrix
 
 Part = Literal["jacobian", "contact", "missing"]
-ZERO_ENTRY = 1e-3  # off-diagonal terms of Γ that count as zero, beside ones on the diagonal
+ZERO_ENTRY = 1e-3  # off-diagonal terms of Γ up to this size count as zero; its diagonal is about one
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def harmonic_block_norms(
     kept: Harmonics | None = None,
     scales: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the norms of the blocks ``∂r^h/∂q^k`` between harmonics: the effect of motion in k on forces in h (fig. 1).
+    """Return the norms of the blocks ``∂r^h/∂q^k`` between harmonics: effect of motion in k on forces in h (fig. 1).
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ def harmonic_block_norms(
     omega
         Frequency, rad/s.
     part
-        ``jacobian``: of J; ``contact``: of K̂; ``missing``: of ΔJ (eq. 20), the blocks that a solution with only the harmonics `kept`
-        neglects: those between different harmonics of which at least one is not kept.
+        ``jacobian``: of J; ``contact``: of K̂; ``missing``: of ΔJ (eq. 20), the blocks between different harmonics of
+        which at least one is not `kept`, which the solution neglects.
     kept
         Harmonics of the solution with few harmonics, for ``missing``.
     scales
@@ -133,7 +133,8 @@ def harmonic_block_norms(
     Returns
     -------
     ndarray
-        (n_h, n_h) largest singular values in the order of ``balance.harmonics``. With natural scales 1 is a stuck contact.
+        (n_h, n_h) largest singular values in the order of ``balance.harmonics``. With natural scales, a stuck contact
+        has the norm 1.
 
     Raises
     ------
@@ -189,6 +190,6 @@ def _rows(balance: HarmonicBalance) -> list[IntArray]:
 
 
 def _neglected(balance: HarmonicBalance, kept: Harmonics) -> BoolArray:
-    """Return which blocks ΔJ has, (n_h, n_h)."""
+    """Return whether each block belongs to ΔJ, (n_h, n_h)."""
     out = ~np.isin(balance.harmonics, kept)
     return (out[:, None] | out) & ~np.eye(out.size, dtype=bool)

@@ -1,4 +1,4 @@
-"""Shares of energy in a spectrum, and supports made of them."""
+"""Energy shares of harmonics in a spectrum, and supports chosen from them."""
 
 from collections.abc import Iterable
 
@@ -24,8 +24,8 @@ def contacts_of_reference(step: Step) -> ContactPeriod:
 def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     """Return the share of each harmonic in the spectral energy (Gastaldi & Berruti 2017, eq. 10).
 
-    ``|q_h|² / (q_0² + sum |q_k|²)``, summed over the relative displacements of the contacts: lengths throughout, where the unknowns
-    mix translations with the rotations of rigid dampers.
+    ``|q_h|² / (q_0² + sum |q_k|²)``, summed over the relative displacements of the contacts, which are all lengths; the
+    unknowns may also contain rotations of rigid dampers.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
 
 
 def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
-    """Return the share of each harmonic in the spectral energy of each coordinate (Gastaldi & Berruti 2017, eq. 10 for one dof).
+    """Return the share of each harmonic in the energy of each coordinate (Gastaldi & Berruti 2017, eq. 10).
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        (len(harmonics), n), the static term first; zeros for a coordinate that moves less than a millionth of the largest, which is
-        the residual of a solver.
+        (len(harmonics), n), the static term first; zeros for a coordinate that moves less than a millionth of the
+        largest, the level of solver residuals.
     """
     square = x.reshape(balance.n_rows, balance.linear.n) ** 2
     each = np.concatenate([square[:1], square[1::2] + square[2::2]])
@@ -76,18 +76,18 @@ def above(step: Step, indicators: Iterable[float], threshold: float) -> Harmonic
 
 
 def up_to(step: Step, order: int) -> Harmonics:
-    """Return the harmonics of the reference up to `order`, and those of the first passage."""
+    """Return the harmonics of the reference up to `order`, and the harmonics of the first passage."""
     return tuple(sorted({*step.smallest, *(h for h in step.reference.harmonics if h <= order)}))
 
 
 def next_up(step: Step, had: Harmonics) -> Harmonics:
-    """Return some harmonics and the reference's next one above them; the same if there is none."""
+    """Return the given harmonics and the next higher one of the reference, if there is one."""
     more = [h for h in step.reference.harmonics if h > had[-1]]
     return tuple(sorted({*had, *more[:1]}))
 
 
 def raised(step: Step) -> Harmonics | None:
-    """Return the harmonics of a solution and the reference's next one above them; None if there is none."""
+    """Return the harmonics of a solution and the next higher one of the reference; None if there is none."""
     more = next_up(step, step.balance.harmonics)
     return None if more == step.balance.harmonics else more
 
@@ -97,8 +97,9 @@ def foretold(
 ) -> Verdict:
     """Return the verdict of a rule that predicts the harmonics of the next frequency.
 
-    `by_dof` are the predicted harmonics of each coordinate; None: the same for all. With `repeats` this frequency is solved again with its own and the
-    predicted harmonics, until it has all predicted ones (Gastaldi & Berruti 2017, section 4.5.3). Harmonics are only added, so that repeats end.
+    `by_dof` contains the predicted harmonics of each coordinate; None: the same for all. With `repeats`, this frequency
+    is solved again with its own and the predicted harmonics until it has all predicted ones (Gastaldi & Berruti 2017,
+    section 4.5.3). Harmonics are only added, so that the repeats end.
     """
     if by_dof is None:
         lacks = set(following) - set(step.balance.harmonics)

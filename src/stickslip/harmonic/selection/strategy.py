@@ -1,9 +1,10 @@
-"""The protocol of harmonic selection: its input at a solved frequency, and its verdict.
+"""Protocol of harmonic selection: input of a strategy at a solved frequency, and its verdict.
 
-A strategy is a frozen dataclass of its parameters with one method, `judge`. It is called once for every converged solution. What it
-answers serves both ways of going through the frequencies (Gastaldi & Berruti 2017, section 4.4): the *double passage*, in which a
-response with few harmonics is finished first and only the frequencies that need more are solved again; and the *single passage*, in
-which each frequency is settled, and the harmonics of the next one are chosen, before going on.
+A strategy is a frozen dataclass of its parameters with one method, `judge`, which is called once for every converged
+solution. Its verdict serves both passages through the frequencies (Gastaldi & Berruti 2017, section 4.4). In the
+*double passage*, the whole response is first solved with few harmonics, and only the frequencies that need more are
+solved again. In the *single passage*, each frequency is completed, and the harmonics of the next one are chosen, before
+going on.
 """
 
 import numbers
@@ -26,9 +27,9 @@ from stickslip.harmonic.structured import StructuredJacobian
 Kept = Literal["low", "high"]
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
-SHARE = 0.01  # of the largest output of its unit: one that moves less is compared with that
-FLOOR = 1e-3  # dofs moving less than this share of the largest have no meaningful relative error
-# the same over all harmonics: below, a static part or a driven harmonic is what the solver left of zero
+SHARE = 0.01  # share of the largest output with the same unit: smaller outputs are compared with this instead
+FLOOR = 1e-3  # share of the largest dof below which a relative error has no meaning
+# the same share over all harmonics: smaller static parts or driven harmonics are residuals of the solver
 NOISE = 1e-6
 
 
@@ -36,18 +37,19 @@ NOISE = 1e-6
 class ErrorMeasure:
     """The largest relative change over some dofs.
 
-    With `units`, the error of the *response*: the change of each dof as a vector of its complex amplitudes, relative to that vector or to 1 % of the
-    largest of the same unit, whichever is larger. A dof nearly at rest is thus compared with the others, and a unit in which nothing moves is left out.
-    Without units the error *as published* (Gastaldi & Berruti 2017, eq. 22, 23 and 29): each harmonic by itself; dofs that move less than a thousandth of
-    the largest are left out.
+    With `units`, it is the error of the *response*: the change of each dof, as a vector of its complex amplitudes,
+    relative to that vector or to 1 % of the largest one with the same unit, whichever is larger. A dof nearly at rest
+    is thus compared with the others, and a unit without motion is left out. Without units, it is the error *as
+    published* (Gastaldi & Berruti 2017, eq. 22, 23 and 29): each harmonic is compared alone, and dofs that move less
+    than a thousandth of the largest are left out.
 
     Parameters
     ----------
     dofs
         Dofs of the structure: outputs, contact dofs, chosen directions.
     harmonics
-        Harmonics of the change: 1; 0 for the static part; those of the excitation. None: all except the static part, which
-        is possible only for an error of the response.
+        Harmonics of the change: 1; 0 for the static part; those of the excitation. None: all except the static part,
+        only for an error of the response.
     units
         (k,) number of the unit of each dof, which separates lengths from rotations. None: error as published.
 
@@ -71,7 +73,10 @@ class ErrorMeasure:
             )
 
     def rows(self, fewer: int, more: int) -> int:
-        """Return the number of compared rows (harmonics from 0 on) of two motions with `fewer` and `more` rows: the common ones, or all if all harmonics count."""
+        """Return the number of compared rows (harmonics from 0 on) of two motions with `fewer` and `more` rows.
+
+        These are the common rows, or all if all harmonics count.
+        """
         return max(fewer, more) if self.harmonics is None else min(fewer, more)
 
     def change(self, before: ComplexArray, moved: ComplexArray) -> tuple[float, int, int]:
@@ -88,7 +93,7 @@ class ErrorMeasure:
             error = np.divide(gone, scales.size, out=np.zeros_like(gone), where=scales.size > 0.0)
         else:
             whole = np.linalg.norm(gone, axis=0, keepdims=True)
-            # of a vector the harmonic that changes most stands for all
+            # the harmonic with the largest change represents the whole vector
             whole = np.where(gone == gone.max(axis=0, keepdims=True), whole, 0.0)
             error = np.divide(whole, scales.size, out=np.zeros_like(gone), where=scales.size > 0.0)
         place = int(np.argmax(error))
@@ -118,7 +123,7 @@ class ErrorMeasure:
         for unit in np.unique(self.units):
             same = self.units == unit
             most = np.max(whole[same])
-            # what the solver left of zero beside a static part, or beside harmonics that do not count, is no motion
+            # a solver residual beside a static part, or beside harmonics that do not count, is not a motion
             still = most <= NOISE * np.max(np.abs(before[:, self.dofs[same]]))
             whole[same] = 0.0 if still else np.maximum(whole[same], SHARE * most)
         return Scales(own, np.broadcast_to(whole, size.shape))
@@ -141,7 +146,7 @@ class Scales:
 
 
 def _rows(motion: ComplexArray, harmonics: IntArray) -> ComplexArray:
-    """Return the rows of some harmonics of a motion (H+1, n), zero beyond its own."""
+    """Return the rows of some harmonics of a motion (H+1, n); zeros beyond its highest one."""
     known = harmonics[harmonics < len(motion)]
     if known.size == harmonics.size:
         return motion[harmonics]
@@ -159,9 +164,9 @@ class Step:
     balance
         The periodic problem with the harmonics of the solution.
     reference
-        The same problem with the reference support ñH, beyond which no strategy goes.
+        The same problem with the reference support ñH, the largest that a strategy may choose.
     smallest
-        Harmonics of the first passage, below which no strategy goes.
+        Harmonics of the first passage, the smallest set that a strategy may choose.
     x
         Scaled solution of `balance`.
     omega, next_omega
@@ -175,7 +180,8 @@ class Step:
     left
         Events found by the accepted evaluation, see `events`.
     by_dof
-        Harmonics of each retained coordinate, if these differ; the others are zero in `x`. None: those of `balance` for all.
+        Harmonics of each retained coordinate, if these differ; the others are zero in `x`. None: the harmonics of
+        `balance` for all.
     """
 
     balance: HarmonicBalance
@@ -255,9 +261,9 @@ class Strategy(Protocol):
 
 
 def always_kept(strategy: Strategy) -> Kept | None:
-    """Return the support of a strategy that keeps the same harmonics at every frequency; None for a strategy that decides.
+    """Return which support a fixed strategy keeps at every frequency; None for a strategy that decides.
 
-    Such a strategy has an attribute `always`.
+    Fixed strategies have an attribute `always`.
     """
     kept: Kept | None = getattr(strategy, "always", None)
     return kept
@@ -306,8 +312,8 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
     Raises
     ------
     InputError
-        If the strategy returns no `Verdict`, or asks for harmonics that the reference does not have; if one that is not of this package
-        raises anything, or returns an indicator that is no finite number.
+        If the strategy returns no `Verdict`, or requests harmonics that the reference does not have; if a user's
+        strategy raises any error, or returns an indicator that is not a finite number.
     """
     place = f"{type(strategy).__name__}.judge"
     own = type(strategy).__module__.partition(".")[0] != __name__.partition(".")[0]
@@ -333,7 +339,7 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
 
 
 def _of_a_user(strategy: Strategy, step: Step, place: str) -> object:
-    """Return what the `judge` of a user's strategy returns; whatever it raises names it, with the line."""
+    """Return the result of a user's `judge`; errors that it raises name it, with the line."""
     try:
         return strategy.judge(step)
     except StickslipError:

@@ -1,4 +1,7 @@
-"""Columns of the contact Jacobian (D. Süß, M. Jerschl and K. Willner, Proc. IMAC XXXIV (2016), second method)."""
+"""Selection of harmonics by columns of the contact Jacobian.
+
+D. Süß, M. Jerschl and K. Willner, Proc. IMAC XXXIV (2016), second method.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,16 +18,18 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 class SuessJacobian:
     """Keep at the next frequency the harmonics that act on others through the contacts.
 
-    The column of harmonic z in the Jacobian of the contact forces, ``‖K̂^{h≠z, z}‖`` over all other vibrating harmonics h of the
-    reference and all contacts (Gastaldi & Berruti 2017, section 3), here relative to its own block ``‖K̂^{z, z}‖``: zero in full
-    stick. The row of the static term is left out: a slider that starts on its limit couples every harmonic to it, stuck or not.
+    The indicator of harmonic z is the norm of its column in the Jacobian of the contact forces, ``‖K̂^{h≠z, z}‖`` over
+    all other vibrating harmonics h of the reference and all contacts (Gastaldi & Berruti 2017, section 3), here
+    relative to its own block ``‖K̂^{z, z}‖``. It is zero in full stick. The row of the static term is left out, because
+    a slider that starts on its limit couples every harmonic to it, even if stuck.
 
     Parameters
     ----------
     threshold
         Norm above which a harmonic is kept; the review gives no number.
     repeats
-        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does
+        not.
     """
 
     verifies: ClassVar[bool] = False
@@ -32,7 +37,10 @@ class SuessJacobian:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Measure the columns; this frequency is solved again only with `repeats`. The indicator is the largest column left out."""
+        """Compute the norms of the columns; this frequency is solved again only with `repeats`.
+
+        The indicator is the largest neglected column.
+        """
         columns = column_norms(step)
         had = step.balance.harmonics
         missed = [c for h, c in zip(step.reference.harmonics, columns, strict=True) if h not in had]

@@ -1,4 +1,7 @@
-"""The missing harmonics from the forces of the present ones (D. Süß, M. Jerschl and K. Willner, Proc. IMAC XXXIV (2016))."""
+"""Selection of harmonics by a solution for the missing ones.
+
+D. Süß, M. Jerschl and K. Willner, Proc. IMAC XXXIV (2016).
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,21 +18,22 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 
 @dataclass(frozen=True)
 class SuessSpectral:
-    """Keep at the next frequency the harmonics that have a share in the energy of the solution with its missing harmonics added.
+    """Keep at the next frequency the harmonics with a sufficient share in the energy, after adding the missing ones.
 
-    Only the missing harmonics are solved for; their effect on the present ones is neglected (Gastaldi & Berruti 2017, eq. 26; in
-    Newton's form, which holds with preloads and gaps, too).
+    Only the missing harmonics are solved for; their effect on the present ones is neglected (Gastaldi & Berruti 2017,
+    eq. 26, in Newton's form, which is also valid with preloads and gaps).
 
     Parameters
     ----------
     threshold
-        Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
-        the amplitude.
+        Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a
+        hundredth of the amplitude.
     frozen
-        Keep the contact forces constant while the missing harmonics grow (eq. 14): their stiffness is then that of the structure
-        alone.
+        Keep the contact forces constant while the missing harmonics are solved (eq. 14), with the stiffness of the
+        structure alone.
     repeats
-        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
+        Solve a frequency again until it has the harmonics that it predicts (section 4.5.3); the published rule does
+        not.
     """
 
     verifies: ClassVar[bool] = False
@@ -38,11 +42,14 @@ class SuessSpectral:
     repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Add the missing harmonics; this frequency is solved again only with `repeats`. The indicator is the largest share of a missing harmonic."""
+        """Add the missing harmonics; this frequency is solved again only with `repeats`.
+
+        The indicator is the largest share of a missing harmonic.
+        """
         q = padded_solution(step)
         missing = np.array([h not in step.balance.harmonics for h in step.reference.harmonics])
         change = self._change(step, q, missing)
-        if change is None:  # all harmonics are kept where nothing can be foretold
+        if change is None:  # without a solution there is no prediction, and all harmonics are kept
             return foretold(step, float("inf"), step.reference.harmonics, repeats=self.repeats)
         shares = spectral_shares(step.reference, q + change)
         largest = float(np.max(shares[missing], initial=0.0))
