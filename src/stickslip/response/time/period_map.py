@@ -1,7 +1,7 @@
-"""The map from a state to the state one period later, with its derivative, for `stickslip.response.time.shooting`.
+"""Map from a state to the state one period later, with its derivative, for `stickslip.response.time.shooting`.
 
-It is the compiled time step of `integrate`, period for period, so that a fixed point of the map is a motion that
-`integrate` would find settled, with the same error of the step.
+It uses the compiled time step of `integrate`, so that a fixed point of the map is a settled motion of `integrate`, with the
+same step error.
 """
 
 from dataclasses import dataclass, replace
@@ -25,21 +25,21 @@ from stickslip.response.time.stepping.step_tangent import (
 )
 from stickslip.response.time.stepping.time_step import StepLog
 
-SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
+SINGULAR = 1e-9  # relative singular value of (1 - monodromy) below which a direction is neutral
 
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """One period from a state.
+    """Motion over one period.
 
     Parameters
     ----------
     state
-        (size,) at the end; NaN if the motion overflowed.
+        (size,) final state; NaN if the motion overflowed.
     failures
         Steps in which the contact equations were not solved to rounding; -1 if the motion overflowed.
     record
-        The steps of the period.
+        Samples of the period.
     """
 
     state: FloatArray
@@ -49,20 +49,20 @@ class Image:
 
 @dataclass(frozen=True, eq=False)
 class Derivative:
-    """One period from a state, with the derivative of where it ends by where it begins.
+    """Motion over one period, with the derivative of its final by its initial state.
 
     Parameters
     ----------
     image
-        The period.
+        The motion.
     monodromy
-        (size, size) derivative of its end; NaN if the motion overflowed.
+        (size, size) derivative of the final state; NaN if the motion overflowed.
     kept
-        States of laws that the period left as they were and would leave so wherever they were: sliders that stuck.
+        Law states that stay constant, also after a small change: sliders that stick.
     unfelt
-        States of laws that no force follows from: what they were is forgotten.
+        Law states without influence on any force.
     idle
-        States of laws that are none of the motion: nothing moves them, and no spring is theirs.
+        Law states that neither change nor act through a spring.
     """
 
     image: Image
@@ -72,9 +72,9 @@ class Derivative:
     idle: IntArray
 
     def inverse(self) -> FloatArray:
-        """Return (size, size) what turns a defect into a correction; directions that nothing decides are left as they are.
+        """Return the (size, size) pseudo-inverse of ``1 - monodromy``, which turns a defect into a correction; zero in neutral directions.
 
-        A slider that sticks for the whole period stays where it is: of the family of motions this is the one that it belongs to.
+        A slider that sticks for the whole period keeps its position, which selects one motion of a family.
         """
         moves = np.setdiff1d(np.arange(len(self.monodromy)), self.kept)
         inverse = np.zeros_like(self.monodromy)
@@ -85,25 +85,25 @@ class Derivative:
 
 @dataclass(frozen=True, eq=False)
 class PeriodMap:
-    """The period map in coordinates whose square is an energy: modal displacement, velocity, states of the laws.
+    """Period map in energy coordinates: modal displacement, velocity, law states.
 
-    A state is ``(ωs q, ωs w, c z)`` with q, w and the speeds s of `ModalCoordinates`, the states z of the laws, and factors c that
-    make the force of a state into that of its contact's spring: half its squared length is the energy of the modes and of the
-    springs, in J, so that distances of states mean the same for stiff and for soft coordinates.
+    A state is ``(ωs q, ωs w, c z)`` with q, w and the speeds s of `ModalCoordinates`, the law states z, and factors c from the contact
+    springs. Half its squared length is the energy of modes and springs, J, so that distances are comparable for stiff and soft
+    coordinates.
 
     Parameters
     ----------
     marcher
-        The structure prepared for time stepping.
+        The structure prepared for time integration.
     linear
         Matrices of its tangents.
     scale
         (size,) factors of (q, w, z).
     shares
-        1, or number of sectors n of a motion that every sector makes a share of the period after another: the map is then that
-        over T/n, with the sectors put where those stand whose state is theirs.
+        Number n of sectors of a travelling motion, in which each sector moves like another one T/n earlier: the map then covers T/n,
+        followed by a shift of the sectors. Otherwise 1.
     shift
-        (size, size) which puts them there; None: there are none.
+        (size, size) shift of the sectors; None without one.
     """
 
     marcher: Marcher
@@ -119,24 +119,24 @@ class PeriodMap:
 
     @property
     def n_motion(self) -> int:
-        """Number of those that are displacements and velocities."""
+        """Number of displacements and velocities in a state."""
         return 2 * self.marcher.n
 
     def start_of(self, state: FloatArray) -> StepState:
-        """Return the state in the form that the step takes."""
+        """Return a state in the form of the time step."""
         return self._begun(state)[0]
 
     def state_of(self, step: StepState) -> FloatArray:
-        """Return the coordinates of a state of the step."""
+        """Return the coordinates of a state of the time step."""
         return np.asarray(self.scale * np.concatenate([step.x[: self.n_motion], step.law]))
 
     def image(self, state: FloatArray) -> Image:
-        """March one period, or its share."""
+        """Integrate one period, or the share T/n followed by the shift."""
         image = self._marched(state, self.marcher.steps // self.shares)
         return image if self.shift is None else replace(image, state=self.shift @ image.state)
 
     def period(self, state: FloatArray) -> Image:
-        """March one whole period."""
+        """Integrate one whole period."""
         return self._marched(state, self.marcher.steps)
 
     def _marched(self, state: FloatArray, steps: int) -> Image:
@@ -144,12 +144,12 @@ class PeriodMap:
         return self._ended(step, self.marcher.march(step, record), record)
 
     def vibration(self, image: Image) -> float:
-        """Return the size of the vibration over a period in the measure of the states; that of the state where there is none."""
+        """Return the size of the vibration over a period in the norm of the states, at least 1e-9 of the final state."""
         n = self.marcher.n
         scale, motion = self.scale[:n], image.record.motion
         if self.shares == 1:
             swing = np.std(motion, axis=0)
-        else:  # all sectors together make a whole period
+        else:  # a share of the period of all sectors together covers the whole period
             basis = self.marcher.modes.basis
             own = (motion @ basis.T).reshape(-1, n // self.shares)
             mean = np.tile(own.mean(axis=0), self.shares)
@@ -159,7 +159,7 @@ class PeriodMap:
         return max(size, 1e-9 * float(np.linalg.norm(image.state)), np.finfo(float).tiny)
 
     def derivative(self, state: FloatArray) -> Derivative:
-        """March one period with its tangents."""
+        """Integrate one period, or its share, with tangents."""
         (step, first), record = (self._begun(state), self.marcher.record(self.marcher.steps // self.shares))
         tangent = first_tangent(first, self.linear, step.law.size)
         seen = np.zeros(first.size, dtype=bool)
@@ -185,7 +185,7 @@ class PeriodMap:
         return Derivative(image, self.shift @ matrix, stays[:0], *rest)
 
     def floquet(self, derivative: Derivative) -> Floquet:
-        """Return the multipliers of a whole period, without those of states that are none of the motion."""
+        """Return the multipliers of a whole period: without idle states, and zero for unfelt ones."""
         none = np.concatenate([derivative.unfelt, derivative.idle])
         states = np.delete(np.arange(self.size), none)
         monodromy = derivative.monodromy[np.ix_(states, states)]
@@ -193,9 +193,9 @@ class PeriodMap:
         return Floquet(np.append(found, np.zeros(derivative.unfelt.size, dtype=complex)))
 
     def _no_motion(self, seen: BoolArray, still: BoolArray) -> tuple[IntArray, IntArray]:
-        """Return which states are unfelt and which idle.
+        """Return the indices of unfelt and of idle states.
 
-        `seen` says which of the laws' derivatives were not zero, `still` which of their states stayed.
+        `seen` marks derivatives of the laws that were not always zero, `still` the states that stayed constant.
         """
         (pattern,) = law_derivatives(seen[None].astype(float), self.linear, still.size)
         sprung = np.any(pattern.force_by_law[self.marcher.contacts.table.stuck != 0.0], axis=0)
@@ -226,7 +226,7 @@ class PeriodMap:
 def period_map(
     marcher: Marcher, start: TransientStart, symmetry: WaveMotion | None = None
 ) -> tuple[PeriodMap, FloatArray]:
-    """Return the period map of a marcher, with a symmetry that over a share of the period, and the coordinates of `start`."""
+    """Return the period map of a marcher and the coordinates of `start`; with a symmetry, the map covers a share of the period."""
     linear = tangent_operators(marcher)
     begin = marcher.begun(start)
     speed = marcher.modes.omega * marcher.modes.speed
@@ -251,9 +251,9 @@ def _shift(marcher: Marcher, symmetry: WaveMotion) -> FloatArray:
 
 
 def _law_scale(marcher: Marcher, linear: TangentOperators) -> FloatArray:
-    """Return (n_states,) factors of the laws' states: their force at rest over the root of the contact's stiffness.
+    """Return (n_states,) factors of the law states: their force at rest over the root of the contact stiffness.
 
-    A state that has no force there, as of a contact that is open, counts as a displacement.
+    A state without force at rest, as in an open contact, counts as a displacement.
     """
     contacts = marcher.contacts
     n_states = contacts.start.size

@@ -1,9 +1,9 @@
-"""Whether a motion in time is periodic: its scatter from period to period, and the growth of small differences.
+"""Test whether a motion in time is periodic, by its change from period to period and the growth of small differences.
 
-It is marched from rest until the harmonics of all gaps repeat or the periods are spent. Of a motion that does not repeat, a copy that is kicked
-by a millionth is marched beside it: if the two part, it is no slow decay. If they do not, the changes must stay as large as they were, where a
-motion of the structure alone would have died: a slow decay looks alike for long. All is done once more with half the step before it is told, and
-again while that makes the motion another one: what an impact is made of by a step that is too long does not repeat itself either.
+The motion is integrated from rest until the harmonics of all gaps repeat or the periods run out. If it does not repeat, a copy with a perturbation of
+a millionth is integrated beside it: a growing difference excludes a slow decay. Without growth, the changes must keep their size for so long that free
+motions of the structure would have decayed. Every negative verdict is checked with half the step, and again while half the step changes the motion: too
+long a step during impacts also prevents repetition.
 """
 
 from collections.abc import Sequence
@@ -22,19 +22,22 @@ from stickslip.response.time.stepping.marcher import MOST_STEPS, ROUGH, Marcher,
 from stickslip.response.time.stepping.propagator import PeriodicLoad
 
 Told = Literal["periodic", "not periodic", "not known"]
-STEPS = 512  # in a period, at least
-PERIODS, LATER = 48, 12  # marched, or twice as many; the last ones are judged
-SOON, CLEARLY = 2 * LATER + 1, 1.2  # periods that do where a small difference grows by so much
-WINDOW, APART = 24, 48  # periods that are compared, and from one to the other: ...
-STAYS, DIED = 0.9, 0.5  # ... least share left of the changes, most of the structure's own motion
-ALIKE = 0.5  # least share that half the step leaves of changes that it does not make
-MOST_WORK = 2e6  # coordinates and gaps, times steps in a period, that are not passed
-MOST_TURNS = 6  # periods after which a motion may repeat itself
-REPEATS = 1e-4  # largest change of the gaps' harmonics, of their size, that counts as none ...
-NEARLY, NOTHING = 1e-3, 1e-9  # ... as none soon, and as rounding
-LASTS = 1e-2  # that counts as one, if it has not become less over the last quarters
-KICK, KICKED = 1e-6, 8  # of the speeds; periods
-PARTED = 0.05  # distance, of the size of the motion, that is no longer small
+STEPS = 512  # least number of steps in a period
+PERIODS, LATER = 48, 12  # integrated periods, or twice as many; number of the last ones that are judged
+SOON, CLEARLY = 2 * LATER + 1, 1.2  # periods that suffice if a small difference grows by this factor in each
+WINDOW, APART = 24, 48  # length of two compared stretches and their distance, in periods
+STAYS, DIED = (
+    0.9,
+    0.5,
+)  # over that distance: least remaining share of lasting changes, largest of the structure's free motion
+ALIKE = 0.5  # least share of the changes with half the step, if the step does not cause them
+MOST_WORK = 2e6  # largest product of steps in a period with the number of coordinates and gaps
+MOST_TURNS = 6  # largest number of periods after which a motion may repeat
+REPEATS = 1e-4  # relative change of the gaps' harmonics below which a motion repeats
+NEARLY, NOTHING = 1e-3, 1e-9  # such a change below which it nearly repeats, and below which it is rounding
+LASTS = 1e-2  # such a change above which a motion does not repeat, if it has not halved since the previous stretch
+KICK, KICKED = 1e-6, 8  # perturbation relative to the speeds; periods with it
+PARTED = 0.05  # distance relative to the motion above which it is no longer small
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +51,19 @@ class Repetition:
     change
         (periods - 1,) relative change of the harmonics of all gaps from period to period.
     every
-        Number of periods after which the motion repeats; 0: it does not repeat.
+        Number of excitation periods after which the motion repeats; 0: it does not repeat.
     wander
         Largest relative change of the first harmonic of the outputs between two of the last periods.
     growth
         Growth factor of a small difference in a period; NaN where it was not computed.
     opened
-        Share of the time in which contacts are open, in the last period.
+        Share of the last period in which contacts are open, mean over all contacts.
     steps, angle
-        Steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
+        Steps in a period, and phase angle per step of the fastest contact that opens or closes, rad.
     kept
         Decay factor per period of the slowest motion of the structure with all contacts stuck; NaN where it was not computed.
     finer
-        Result with half the step; None where every period is like the previous one.
+        Result with half the step; None where the motion repeats after one period.
     """
 
     motion: ComplexArray
@@ -96,7 +99,7 @@ class Repetition:
 
     @property
     def _stays(self) -> bool:
-        """Whether changes last where a motion of the structure would have died."""
+        """Whether changes keep their size for so long that free motions of the structure would have decayed."""
         if len(self.change) < 2 * WINDOW + APART - 1 or not self.kept**APART <= DIED:
             return False
         before = self.change[-WINDOW - APART : -APART]
@@ -104,7 +107,7 @@ class Repetition:
 
     @property
     def verdict(self) -> Told:
-        """Common verdict of both step lengths, if they agree."""
+        """Common verdict of both step lengths; ``not known`` if they differ."""
         return self.alone if self.finer is None or self.agrees else "not known"
 
     @property
@@ -131,27 +134,27 @@ def repetition(
     order: int,
     steps: int = STEPS,
 ) -> Repetition:
-    """Return whether the motion from rest becomes periodic. Otherwise it is integrated again with half the step, until both agree.
+    """Test whether the motion from rest becomes periodic; if not, integrate again with half the step, until both agree.
 
     Parameters
     ----------
     structure, contacts, load
         Any real structure, contacts with a stiffness, and periodic loads.
     omega
-        rad/s.
+        Frequency of the load, rad/s.
     outputs
-        Dofs whose first harmonic is watched.
+        Dofs whose first harmonic is monitored.
     order
         Highest harmonic.
     steps
-        Smallest number of steps in a period, doubled until half the step resolves the impacts, see
+        Smallest number of steps in a period; it is doubled until half the step resolves the impacts, see
         `stickslip.response.time.stepping.marcher`.
     """
 
     def made(steps: int) -> Marcher:
         return prepared(structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights)
 
-    # the march with half the step is the one that has to follow the impacts
+    # only half the step has to resolve the impacts
     marcher = with_enough_steps(made, rest(structure.n, contacts.laws), steps, 2.0 * ROUGH)
     state = marcher.begun(rest(structure.n, contacts.laws))
     found = _marched(marcher, state, outputs, order)
@@ -161,7 +164,7 @@ def repetition(
         finer = _marched(fine, state, outputs, order)
         if finer.every == 1 or not finer.finite:
             return finer
-        # a motion that settles slowly may come to repeat itself only in the second march
+        # a slowly settling motion may repeat only in the second integration
         found = replace(found, every=found.every or finer.every, finer=finer)
         if found.agrees or 2 * fine.steps > _most_steps(fine):
             return found
@@ -174,7 +177,7 @@ def _most_steps(marcher: Marcher) -> float:
 
 
 def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) -> Repetition:
-    """March until the motion repeats itself, small differences are seen to grow, or the periods are spent."""
+    """Integrate until the motion repeats, small differences grow, or the periods run out."""
     record, basis, seen = marcher.record(), marcher.modes.basis, _Seen([], [], [])
     every, growth, kept = 0, np.nan, np.nan
     for until in (SOON, PERIODS, 2 * PERIODS):
@@ -196,7 +199,7 @@ def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """Harmonics of the gaps, first harmonic of the outputs, and angle of the fastest contact that opens, of each period."""
+    """Record of each period: harmonics of the gaps, first harmonic of the outputs, angle of the fastest opening contact."""
 
     gaps: list[ComplexArray]
     first: list[ComplexArray]
@@ -208,7 +211,7 @@ class _Seen:
 
 
 def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: FloatArray, order: int, most: int) -> int:
-    """March until there are so many periods or it repeats itself; return after how many periods it does, 0: it does not."""
+    """Integrate up to `most` periods or until the motion repeats; return the number of periods after which it does, or 0."""
     record = marcher.record()
     while len(seen.gaps) < most:
         lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
@@ -224,9 +227,10 @@ def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: Flo
 
 
 def _repeats(gaps: Sequence[ComplexArray]) -> int:
-    """Return the number of periods after which a motion repeats, 0 for none; several only if the motion keeps changing within them.
+    """Return the number of periods after which a motion repeats; 0: it does not.
 
-    A motion that dies at a half of the frequency changes less from two periods to the next two than from one to the next, too, but both alike.
+    Several periods count only if the change from one to the next persists. In a decaying subharmonic motion, the change over two periods is also smaller
+    than over one, but both decay.
     """
     single = float(_changes(gaps[-5:], 1).max())
     if single < REPEATS:
@@ -240,14 +244,14 @@ def _repeats(gaps: Sequence[ComplexArray]) -> int:
     found = next((m for m, change in near.items() if change < REPEATS), 0)
     if not found or near[found] > max(DIED * _changes(before[-4 - found :], found).max(), NOTHING):
         return 0
-    # before all has settled a multiple may be nearer
+    # before the motion has settled, a multiple of the period may match better
     return next(m for m, change in near.items() if found % m == 0 and change < NEARLY)
 
 
 def _growth(marcher: Marcher, state: StepState) -> float:
-    """Return the factor by which the distance of a kicked copy grows in a period while it is small.
+    """Return the growth factor per period of the distance of a perturbed copy while it is small.
 
-    Of each half of the periods the largest distance counts: one that merely swings between displacement and speed does not grow.
+    The largest distances in each half of the periods are compared, since a distance may oscillate between displacement and speed.
     """
     n, record = marcher.n, marcher.record()
     own, other = (StepState(state.x.copy(), state.seen.copy(), state.law.copy(), state.status.copy()) for _ in range(2))
@@ -270,7 +274,7 @@ def _harmonics(samples: FloatArray, order: int) -> ComplexArray:
 
 
 def _changes(gaps: Sequence[ComplexArray], turns: int) -> FloatArray:
-    """Return the changes over so many periods, of the size of the vibration."""
+    """Return the changes over `turns` periods, relative to the vibration."""
     size = max(*(float(np.linalg.norm(g[1:])) for g in gaps), np.finfo(float).tiny)
     return np.array([float(np.linalg.norm(b - a)) / size for a, b in zip(gaps, gaps[turns:], strict=False)])
 

@@ -1,9 +1,9 @@
-"""All sectors of a tuned wheel in time: each sector is integrated, as harmonics have no waves there.
+"""All sectors of a tuned wheel in time: each sector is integrated, since waves belong to harmonics.
 
-The coordinates of a tuned wheel mean the same in every wave, and so do its gaps. The motion of sector s is the sum of its waves,
-``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are the transforms of those of the waves. An engine order
-m that has a divisor g in common with the number of sectors makes the same motion in n_s/g sectors; they stand for all. Aerodynamic
-forces are those of their frozen form, whose matrices are real for the wheel as a whole.
+The coordinates and gaps of a tuned wheel have the same meaning in every wave. The motion of sector s is the sum of its waves,
+``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are discrete Fourier transforms of the waves' matrices. If the
+engine order m and the number of sectors n_s have the greatest common divisor g, the motion repeats after n_s/g sectors, which represent
+all. Aerodynamic forces enter in their frozen form, with real matrices for the whole wheel.
 """
 
 from collections.abc import Mapping
@@ -26,19 +26,19 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.system import System
 
-REAL = 1e-8  # of the largest entry: imaginary parts below it are rounding
+REAL = 1e-8  # imaginary part over the largest entry, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class WaveMotion:
-    """Travelling motion: all sectors move alike, each a share of the period after another.
+    """Travelling motion: all sectors move alike with time shifts of T/n.
 
     Parameters
     ----------
     sectors
-        n: number of sectors, and of shares of the period.
+        Number n of sectors, and of shares of the period T.
     ahead
-        Number of places: after a share T/n of the period a sector has the present state of the sector so many places further on.
+        After T/n a sector has the present state of the sector `ahead` places further on.
     """
 
     sectors: int
@@ -52,7 +52,7 @@ class WaveMotion:
 
 @dataclass(frozen=True, eq=False)
 class SectorsInTime:
-    """A tuned wheel as `integrate` and `shoot` take it; `all_sectors` makes one.
+    """Tuned wheel for `integrate` and `shoot`; `all_sectors` makes one.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class SectorsInTime:
     motion
         Symmetry of the travelling motion.
     wheel
-        The wheel of one sector.
+        The tuned wheel, described by one sector.
     """
 
     structure: Structure
@@ -71,10 +71,9 @@ class SectorsInTime:
     wheel: TunedWheel
 
     def spread(self, coefficients: ComplexArray) -> ComplexArray:
-        """Return the (H + 1, sectors · n) amplitudes of all sectors from those (H + 1, n) of the wheel's harmonics.
+        """Return the (H + 1, sectors · n) amplitudes of all sectors from the wheel's harmonics (H + 1, n).
 
-        Harmonics of waves that turn against the one that the matrices were taken from are left out: their modal coordinates
-        may be others.
+        Harmonics whose waves travel against the wave of the matrices are omitted: their modal coordinates may differ.
         """
         rows = []
         for h, row in enumerate(coefficients[:, : _kept(self.wheel)]):
@@ -84,7 +83,7 @@ class SectorsInTime:
         return np.array(rows)
 
     def travelling(self, rows: ComplexArray) -> ComplexArray:
-        """Return the (H + 1, sectors · p) amplitudes of all sectors of what means the same in every wave, as gaps do (H + 1, p)."""
+        """Return the (H + 1, sectors · p) amplitudes in all sectors of quantities (H + 1, p) with the same meaning in every wave, such as gaps."""
         return np.array([_travelling(self.wheel, h, r, self.count) for h, r in enumerate(rows)])
 
     @property
@@ -99,17 +98,17 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     Parameters
     ----------
     system
-        System with a `TunedWheel` whose waves reach half the number of different sectors.
+        System with a `TunedWheel` whose waves reach half the number of distinct sectors.
     load
         Loads on the coordinates of its harmonics.
     every
-        Whether all sectors of the wheel are wanted, each of which may then do something else, and not those alone that do different
-        things under the engine order. The wheel then needs all its waves (`TunedWheel.has_every_wave`).
+        Whether to include all sectors, with independent motions, and not only the distinct ones under the engine order. The wheel then
+        needs all its waves (`TunedWheel.has_every_wave`).
 
     Raises
     ------
     InputError
-        If waves are missing, have matrices that no motion in time has, or a load acts on a wave that turns against another one.
+        If waves are missing, their matrices allow no equations in time, or the load drives a wave that travels against another one.
     """
     wheel, interface = system.structure.wheel, system.interface
     if wheel is None:
@@ -147,16 +146,16 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     return SectorsInTime(structure, contacts, HarmonicLoad(static, loads), motion, wheel)
 
 
-@lru_cache(maxsize=1)  # each point that is examined asks for it
+@lru_cache(maxsize=1)  # needed for each examined point
 def whole_wheel(system: System) -> SectorsInTime:
-    """Return all sectors of a system with a tuned wheel that has every wave, each of which may do something else; nothing drives them."""
+    """Return all sectors of an unloaded tuned wheel with every wave, with independent motions of the sectors."""
     still = HarmonicLoad(np.zeros(system.structure.n))
     return all_sectors(system, still, every=True)
 
 
 @dataclass(frozen=True, eq=False)
 class InTime:
-    """Structure and gaps of a periodic motion for its disturbances; `all_in_time` makes one.
+    """Structure and gaps of a periodic motion, to compute its disturbances; `all_in_time` makes one.
 
     Parameters
     ----------
@@ -167,7 +166,7 @@ class InTime:
     sectors
         Number of sectors; 1 for a single structure.
     shares, ahead
-        After one of so many shares of the period each sector does what the sector so many places further on does now.
+        After a period over `shares`, each sector has the present state of the sector `ahead` places further on.
     """
 
     structure: Structure
@@ -188,7 +187,7 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
     Parameters
     ----------
     system
-        System; of a wheel with every wave (`TunedWheel.has_every_wave`) all sectors are marched.
+        System; for a wheel with every wave (`TunedWheel.has_every_wave`), all sectors are included.
     gaps
         (H+1, 3 n_contacts) complex coefficients, m.
     """
@@ -208,7 +207,7 @@ def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
 
 
 def sectors_in_time(system: System) -> int:
-    """Return the number of sectors in time integration: on a tuned wheel the distinct ones, with every wave all; otherwise 1."""
+    """Return the number of sectors in time: all of a tuned wheel with every wave, the distinct ones of other tuned wheels, otherwise 1."""
     wheel = system.structure.wheel
     if wheel is None:
         return 1
@@ -216,26 +215,26 @@ def sectors_in_time(system: System) -> int:
 
 
 def _kept(wheel: TunedWheel) -> int:
-    """Return the number of a sector's coordinates that move by themselves; behind them are copies of neighbours' and what ties these."""
+    """Return the number of a sector's own coordinates; copies of neighbours' coordinates and their constraints follow."""
     return wheel.n - 2 * wheel.multipliers.size
 
 
 def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix, sectors: int) -> ComplexArray:
-    """Return a row (n,) of a harmonic of sector 0 for so many sectors."""
+    """Return a row (n,) of a harmonic, given for sector 0, for `sectors` sectors."""
     k = excited_wave(wheel.engine_order, wheel.sectors, harmonic)
     phases = np.exp(2j * np.pi * k * np.arange(sectors) / wheel.sectors)
     return np.asarray((phases[:, None] * row).ravel())
 
 
 def _wave(wheel: TunedWheel, k: int) -> Structure:
-    """Return the structure of a wave number, of which a harmonic comes first, or the conjugate of that of the other direction."""
+    """Return the structure of a wave number, or the conjugate for the opposite direction, whichever has the lower harmonic."""
     chosen = _chosen(wheel.waves, k % wheel.sectors, wheel)
     structure = wheel.waves[chosen]
     return structure if chosen == k % wheel.sectors else _conjugate(structure)
 
 
 def _chosen(waves: Mapping[int, Structure], k: int, wheel: TunedWheel) -> int:
-    """Return k or the wave number of the other direction, whichever belongs to the lower harmonic."""
+    """Return k or the wave number of the opposite direction, whichever belongs to the lower harmonic."""
     excited = (excited_wave(wheel.engine_order, wheel.sectors, h) for h in range(wheel.harmonics + 1))
     for found in (*excited, *sorted(waves)):
         if found in waves and found in (k, (wheel.sectors - k) % wheel.sectors):
@@ -248,7 +247,7 @@ def _chosen(waves: Mapping[int, Structure], k: int, wheel: TunedWheel) -> int:
 
 
 def _agrees(wheel: TunedWheel, harmonic: int) -> bool:
-    """Whether a harmonic's wave is the one that the matrices are taken from, or its conjugate."""
+    """Whether a harmonic's wave is the wave of the matrices, or its conjugate."""
     k = excited_wave(wheel.engine_order, wheel.sectors, harmonic)
     chosen = _chosen(wheel.waves, k, wheel)
     if chosen == k:
@@ -277,7 +276,7 @@ def _dense(matrix: Matrix) -> Matrix:
 
 
 def _dofs(own: Dofs, sectors: int) -> Dofs:
-    """Return the table of the coordinates of all sectors."""
+    """Return the coordinates of all sectors."""
     named = own.part or ("",) * len(own.component)
     parts = [f"sector{s}.{part}" if part else f"sector{s}" for s in range(sectors) for part in named]
     return Dofs(np.tile(own.node, sectors), own.component * sectors, np.tile(own.position, (sectors, 1)), tuple(parts))

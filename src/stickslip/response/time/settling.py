@@ -1,4 +1,4 @@
-"""Harmonics of a period in time, and whether the motion has become periodic."""
+"""Harmonics of a period in time, and the test whether the motion has become periodic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,8 +9,8 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 
 SettlingStatus = Literal["settled", "unsettled", "diverged"]
-LONGEST_MEMORY = 1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
-OVERFLOW = 1e100  # far above every motion, and its square is still a number
+LONGEST_MEMORY = 1e4  # periods; slowest assumed decay of a structure (damping ratio 1.6e-5)
+OVERFLOW = 1e100  # far above every motion, with a finite square
 
 
 def overflowed(*arrays: FloatArray) -> bool:
@@ -19,18 +19,18 @@ def overflowed(*arrays: FloatArray) -> bool:
 
 
 def last_third(n: int) -> int:
-    """Return the length of the stretch over which `n` periods are judged: at least four."""
+    """Return the length of the stretch that judges `n` periods: a third, at least four."""
     return max(4, n // 3)
 
 
 def remaining_change(changes: Sequence[float]) -> float:
     """Estimate the sum of the remaining changes of a sequence that decays per period.
 
-    The largest changes of two successive stretches, each a third of the record and at least four periods, give the
-    ratio ρ of the decay per period; the rest is ``d ρ / (1 - ρ)``. The stretches grow with the record so that slow
-    beating is seen as such, and no sum is cut short by a small last change alone: a lightly damped transient that
-    changes by 1e-6 a period may still have 1e-3 to go. Where no decay can be seen, as at the level of rounding, the
-    slowest decay that is credited to a structure is assumed.
+    The largest changes d of two successive stretches, each a third of the record and at least four periods, give the
+    decay ratio ρ per period; the remaining sum is ``d ρ / (1 - ρ)``. The stretches grow with the record, so that slow
+    beating is recognised. A small last change alone proves nothing: a lightly damped transient that changes by 1e-6 a
+    period may still have 1e-3 to go. Without a visible decay, as at the level of rounding, the slowest decay of
+    `LONGEST_MEMORY` is assumed.
     """
     late, early = last_changes(changes)
     if np.isnan(late):
@@ -43,7 +43,7 @@ def remaining_change(changes: Sequence[float]) -> float:
 
 
 def last_changes(changes: Sequence[float]) -> tuple[float, float]:
-    """Return the largest change of the last stretch and of the one before; NaN where the record is too short for two."""
+    """Return the largest changes of the last stretch and of the one before; NaN if the record is too short for two."""
     stretch = last_third(len(changes))
     if len(changes) < 2 * stretch:
         return np.nan, np.nan
@@ -51,7 +51,7 @@ def last_changes(changes: Sequence[float]) -> tuple[float, float]:
 
 
 def period_harmonics(began: FloatArray, samples: FloatArray, order: int) -> ComplexArray:
-    """Fourier coefficients 0..order of a period by the trapezoidal rule, its ends counted half each."""
+    """Return the Fourier coefficients 0..order of a period by the trapezoidal rule, with half weight for each end."""
     period = np.vstack([(began + samples[-1]) / 2, samples[:-1]])
     coefficients = np.fft.rfft(period, axis=0)[: order + 1] * (2.0 / len(period))
     coefficients[0] /= 2.0
@@ -60,17 +60,17 @@ def period_harmonics(began: FloatArray, samples: FloatArray, order: int) -> Comp
 
 @dataclass(slots=True)
 class Progress:
-    """Progress of a time integration; its only state besides that of the motion."""
+    """Progress of a time integration; its only state besides the motion."""
 
     harmonics: ComplexArray  # (n_h + 1, n_outputs) of the last period; NaN before the first
-    unknown: FloatArray  # (n,) NaN: a drift that cannot be told
+    unknown: FloatArray  # (n,) NaN: unknown drift
     status: SettlingStatus = "unsettled"
     periods: int = 0
     failures: int = 0
     remaining: float = np.inf
     judged: tuple[int, ...] = (1,)  # harmonics that have to settle
-    changes: list[float] = field(default_factory=list)  # of these, relative
-    each: list[ComplexArray] = field(default_factory=list)  # the harmonics of every period
+    changes: list[float] = field(default_factory=list)  # relative changes of these harmonics
+    each: list[ComplexArray] = field(default_factory=list)  # harmonics of every period
     means: list[FloatArray] = field(default_factory=list)  # (n,) mean displacement of every period
 
     def take_in(self, harmonics: ComplexArray, mean: FloatArray, failures: int, tolerance: float) -> None:
@@ -84,12 +84,12 @@ class Progress:
             self.status = "settled" if self.remaining < tolerance else "unsettled"
 
     def goes_on(self, least: int) -> bool:
-        """Whether there is more to be seen: nothing of a motion that has overflowed, of a settled one until `least` periods are over."""
+        """Whether to continue: not after an overflow, and in a settled motion only up to `least` periods."""
         return self.status == "unsettled" or (self.status == "settled" and self.periods < least)
 
     @property
     def decay(self) -> float:
-        """Largest change of the last third over that of the third before; NaN without two such stretches or without any change."""
+        """Largest change of the last third over the third before; NaN without two such stretches or without any change."""
         late, early = last_changes(self.changes)
         return late / early if early > 0.0 else np.nan
 
@@ -106,7 +106,7 @@ class Progress:
 
     @property
     def scatter(self) -> float:
-        """Largest relative distance from that average."""
+        """Largest relative distance of a period's harmonics from the average."""
         average = self.average
         last = self.each[-last_third(self.periods) :]
         return max((self._relative(one - average, average) for one in last), default=np.nan)
@@ -120,7 +120,7 @@ class Progress:
         return (self.means[-1] - self.means[-1 - stretch]) / stretch
 
     def _relative(self, difference: ComplexArray, size: ComplexArray) -> float:
-        """Return the largest entry of the judged harmonics of a difference over that of the reference."""
+        """Return the largest judged harmonic of a difference, relative to the reference's largest."""
         own = list(self.judged)
         largest = float(np.max(np.abs(size[own])))
         return float(np.max(np.abs(difference[own]))) / largest if largest > 0.0 else 0.0

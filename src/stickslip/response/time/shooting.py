@@ -1,4 +1,4 @@
-"""Shooting: Newton's method on the period map, and the time-step error of the motion that it finds."""
+"""Shooting: Newton's method on the period map, and the time-step error of its solution."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,51 +23,52 @@ from stickslip.response.time.stepping.step_tangent import tangent_operators
 from stickslip.response.time.transient import TimeStepping, check_outputs
 
 ShootingStatus = Literal["converged", "coarse", "not converged", "diverged"]
-TOLERANCE = 1e-9  # of the distance to the orbit, relative to its vibration, where no stepping is given
+TOLERANCE = 1e-9  # default distance to the orbit, relative to its vibration
 MOST_CORRECTIONS = 40
-WARM_UP = 2  # periods before the first correction: slipping contacts forget what the start got wrong
-SHORTEST = 1.0 / 16.0  # part of a correction, tried before it is given up
-CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, halves the distance
-FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
-ANEW = 8  # corrections of a search begun anew: from where the plain periods near an orbit four are enough
-RESERVE = 2 * ANEW  # periods left for them
-COARSE = 0.01  # of the largest harmonic: a step that errs by more has not found the motion
-NEUTRAL_DISTANCE = 0.05  # distance of the growth from 1 below which its error is looked for
-JUMP = 1.5  # times the largest friction force: a change within a step that passes over stick
-TURNS = 2.0  # the same of first order: of the derivative, which feels where in a step a slider turns
-RICHARDSON = 4.0 / 3.0  # error of a method of second order over its change when the step is halved
-ERRATIC = 10.0  # the most: where the second of two changes is as large as the first nothing says that more steps lead anywhere
+WARM_UP = 2  # periods before the first correction, in which slipping contacts forget errors of the start
+SHORTEST = 1.0 / 16.0  # shortest tried fraction of a correction
+CONTRACTION = 0.5  # a derivative is reused while one period, which costs far less, halves the distance
+FALLBACK = 8  # plain periods after a correction that fails at any length
+ANEW = 8  # corrections of a renewed search: near an orbit four are enough
+RESERVE = 2 * ANEW  # periods reserved for them
+COARSE = 0.01  # largest step error of a valid motion, relative to the largest harmonic
+NEUTRAL_DISTANCE = 0.05  # distance of the growth from 1 below which its step error is estimated
+JUMP = 1.5  # change of a friction force within a step, over its largest value, that skips stick
+TURNS = (
+    2.0  # error over change with half the step, for a method of first order, as the derivative at reversals of a slider
+)
+RICHARDSON = 4.0 / 3.0  # the same ratio for a method of second order
+ERRATIC = 10.0  # largest such ratio: if the second change is as large as the first, more steps need not converge
 
 
 @dataclass(frozen=True, eq=False)
 class ShootingResult:
-    """A periodic motion and the growth of its disturbances.
+    """Periodic motion and the growth of its disturbances.
 
     Parameters
     ----------
     status
-        ``converged``; ``coarse``: periodic, but with twice as many steps the harmonics would change by more than 1 %, so that
-        these are not those of the motion; ``not converged``: the periods ran out, or the plain periods settled and the corrections from there
-        did not, or there is no periodic motion nearby (a drift); ``diverged``: the motion overflowed, and all arrays are
-        NaN.
+        ``converged``; ``coarse``: periodic, but the estimated step error of the harmonics is above 1 %; ``not converged``: the periods ran
+        out, or plain periods settled but the corrections from there did not, or there is no periodic motion nearby (a drift);
+        ``diverged``: the motion overflowed, and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes, m.
     floquet
-        Multipliers of the motion, and how many of them are neutral.
+        Floquet multipliers of the motion, and the number of neutral ones.
     periods
-        Periods marched, those with tangents among them; a correction that is under way may go beyond the most by a few.
+        Integrated periods, with and without tangents; the last correction may exceed the allowed number by a few.
     corrections
-        Periods marched with tangents, each of which costs as much as some six others.
+        Periods integrated with tangents, each of which costs as much as about six others.
     residual
-        Distance of the state after a period from that before, relative to the vibration of the orbit.
+        Change of the state over a period, relative to the vibration of the orbit.
     distance
-        Length of the last correction, relative to the same.
+        Length of the last correction, relative to the vibration of the orbit.
     step_error
-        Estimated error of the harmonics by the step, relative to the largest: twice as many steps tell, and four times as many
-        where a contact opens or closes. NaN where no motion was found.
+        Estimated step error of the harmonics, relative to the largest, from twice as many steps, and four times as many where a contact
+        opens or closes. NaN without a motion.
     growth_error
-        That of the largest modulus of the multipliers where it is within 0.05 of 1 or a contact opens or closes; infinite where a
-        slider turns within a step, which the multipliers do not see, or where openings make the motion coarse; 0 elsewhere.
+        Estimated step error of the multipliers' largest modulus, where it is within 0.05 of 1 or a contact opens or closes. Infinite where
+        a slider reverses within a step, which the multipliers miss, or where openings make the motion coarse; 0 elsewhere.
     contact_failures
         Time steps of the last period in which the contact equations were not solved to rounding.
     final
@@ -95,17 +96,17 @@ class ShootingResult:
 
     @property
     def converged(self) -> bool:
-        """Whether the motion is periodic to the tolerance."""
+        """Whether the motion is periodic within the tolerance."""
         return self.status == "converged"
 
     @property
     def stable(self) -> bool:
-        """Whether it is periodic and no small disturbance of it grows; neutral multipliers are not judged."""
+        """Whether the motion is periodic and no small disturbance grows; neutral multipliers are not judged."""
         return self.converged and self.floquet.stable and not self.undecided
 
     @property
     def undecided(self) -> bool:
-        """Whether the error of the step reaches from the growth to 1, so that nothing is known of the stability: give more steps."""
+        """Whether the stability is unknown, as the step error of the growth exceeds its distance from 1: more steps may decide."""
         distance = abs(self.floquet.growth - 1.0)
         return self.converged and UNIT_TOLERANCE < distance <= self.growth_error
 
@@ -138,28 +139,27 @@ def shoot(  # noqa: PLR0913
 ) -> ShootingResult:
     """Find a periodic motion of ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` with the period of the load.
 
-    Newton's method on ``P(z) = z`` for the state z at t = 0, P being one period of the steps that `integrate` takes.
-    Where contacts stick for the whole period a family of motions exists, one for each place of their sliders: they stay
-    where the first periods have left them. Where the derivative of ``P(z) - z`` is singular otherwise, as of a body that
-    nothing holds, the shortest correction is taken. The search
-    begins with plain periods; a correction that leads away from the orbit is shortened, and if that does not help
-    replaced by plain periods. Where forty corrections do not converge, the motion is marched on from the start in ever
-    longer blocks, as `integrate` would, with a short search after each of them, until it settles or the periods run out.
+    Newton's method solves ``P(z) = z`` for the state z at t = 0, where P is one period with the time step of `integrate`.
+    Contacts that stick for the whole period allow a family of motions, one for each position of their sliders: the sliders
+    keep their positions after the first periods. If the derivative of ``P(z) - z`` is singular otherwise, as for a free body,
+    the shortest correction is taken. The search begins with plain periods. A correction that leads away from the orbit is
+    shortened; if this does not help, plain periods replace it. If forty corrections do not converge, the motion is integrated
+    from the start in ever longer blocks with a short search after each, until it settles or the periods run out.
 
     Parameters
     ----------
     structure, gap_operator, laws, load, omega, outputs
         As in `integrate`; a `HarmonicLoad` is a load.
     start
-        State at t = 0, best that of a harmonic balance (`start_from_harmonics`); rest if None.
+        State at t = 0, preferably from a harmonic balance (`start_from_harmonics`); rest if None.
     stepping
-        Steps of a period, most periods in all, number of harmonics; `tolerance` bounds the length of the last correction
+        Steps in a period, largest number of periods, number of harmonics; `tolerance` bounds the length of the last correction
         relative to the vibration. If None, 1024 steps and 1e-9.
     weights
         (n_contacts,) factors of the contact forces; None: ones.
     symmetry
-        That of all sectors of a tuned wheel (`SectorsInTime.motion`): the map is then that over the share of the period after which
-        each sector is in the state of another, and the motions that are found are those that travel with the load.
+        Symmetry of all sectors of a tuned wheel (`SectorsInTime.motion`): the map then covers the share of the period after which each
+        sector has the initial state of another. Only motions that travel with the load are found.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def shoot(  # noqa: PLR0913
 
 
 def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, corrections: int) -> None:
-    """Correct the state until it converges, or the corrections or all periods have run out."""
+    """Correct the state until it converges, or the corrections or periods run out."""
     last = search.corrections + corrections
     while search.status == "not converged" and search.corrections < last and search.periods < stepping.max_periods:
         if not _correct(mapping, search, stepping.tolerance):
@@ -201,10 +201,9 @@ def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, correct
 
 
 def _march_and_search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, warm: FloatArray) -> None:
-    """March on from `warm` in blocks, each twice as long as the last, with a search begun anew after each.
+    """Integrate from `warm` in blocks, each twice as long as the last, with a new search after each.
 
-    The march does not take over what a search that failed has left: it comes to every orbit that `integrate` comes to, in
-    as many periods.
+    The integration ignores the states of failed searches, so that it reaches every orbit that `integrate` reaches, in as many periods.
     """
     changes: list[float] = []
     block, settled = FALLBACK, False
@@ -219,7 +218,7 @@ def _march_and_search(mapping: PeriodMap, search: _Search, stepping: TimeSteppin
 
 
 def _search_anew(mapping: PeriodMap, search: _Search, stepping: TimeStepping) -> None:
-    """Take some corrections; leave it to the march where one does not come nearer."""
+    """Take a few corrections; stop at the first that does not come nearer."""
     last = search.corrections + ANEW
     while search.status == "not converged" and search.corrections < last and search.periods < stepping.max_periods:
         if not _correct(mapping, search, stepping.tolerance):
@@ -227,7 +226,7 @@ def _search_anew(mapping: PeriodMap, search: _Search, stepping: TimeStepping) ->
 
 
 def _settle(mapping: PeriodMap, search: _Search, periods: int, changes: list[float], tolerance: float) -> bool:
-    """March plain periods; return whether the state has settled, as `integrate` judges the first harmonic."""
+    """Integrate plain periods; return whether the state has settled, by the criterion of `integrate`."""
     for _ in range(periods):
         image = mapping.image(search.state)
         search.periods += 1
@@ -243,7 +242,7 @@ def _settle(mapping: PeriodMap, search: _Search, periods: int, changes: list[flo
 
 
 def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
-    """Replace the state by that some plain periods later."""
+    """Advance the state by plain periods."""
     for _ in range(periods):
         image = mapping.image(search.state)
         search.periods += 1
@@ -254,7 +253,7 @@ def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
 
 
 def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
-    """Take one Newton correction; return whether it came nearer to an orbit, True too where that is settled."""
+    """Take one Newton correction; return whether it came nearer to an orbit, or the search has ended."""
     here = search.derivative = mapping.derivative(search.state)
     image = here.image
     search.periods += 1
@@ -276,9 +275,9 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
 
 
 def _approach(mapping: PeriodMap, search: _Search, inverse: FloatArray, correction: FloatArray, close: float) -> bool:
-    """Correct the state, with the same derivative for as long as that pays; return whether the residual fell.
+    """Correct the state, with the same derivative while it converges fast; return whether the distance decreased.
 
-    Distances are taken in the measure of the correction itself, in which weakly damped directions count as much as others.
+    Distances are lengths of corrections, in which weakly damped directions count fully.
     """
     length, share, nearer = float(np.linalg.norm(correction)), 1.0, False
     state = search.state
@@ -303,7 +302,7 @@ def _approach(mapping: PeriodMap, search: _Search, inverse: FloatArray, correcti
 def _result(
     mapping: PeriodMap, search: _Search, outputs: IntArray, stepping: TimeStepping, finer: Callable[[int], Marcher]
 ) -> ShootingResult:
-    """March the period that is reported, and hold it against one with finer steps."""
+    """Integrate the reported period, and compare it with finer steps."""
     image = mapping.period(search.state)
     status: ShootingStatus = "diverged" if image.failures < 0 else search.status
     known = np.nan if status == "diverged" else 1.0
@@ -345,10 +344,10 @@ class StepErrors:
     Parameters
     ----------
     motion
-        Error of the harmonics of the outputs, relative to the largest; infinite where more steps overflow.
+        Error of the outputs' harmonics, relative to the largest; infinite if finer steps overflow.
     growth
-        Error of the largest modulus of the multipliers where it is close to 1 or a contact opens or closes; infinite where a slider
-        reverses within a step, which derivatives miss; 0 elsewhere.
+        Error of the multipliers' largest modulus, where it is close to 1 or a contact opens or closes; infinite where a slider reverses
+        within a step, which derivatives miss; 0 elsewhere.
     """
 
     motion: float
@@ -412,15 +411,15 @@ def _change(one: ComplexArray, other: ComplexArray, size: float) -> float:
 def _corrected(
     mapping: PeriodMap, marcher: Marcher, state: FloatArray, found: Derivative
 ) -> tuple[PeriodMap, FloatArray]:
-    """Return the map with finer steps, and a state corrected towards its fixed point with the known derivative."""
+    """Return the map with finer steps and the state after one correction with the known derivative."""
     fine = replace(mapping, marcher=marcher, linear=tangent_operators(marcher))
     return fine, state + found.inverse() @ (fine.image(state).state - state)
 
 
 def _scattered(first: float, second: float, least: float) -> float:
-    """Return the error of the first of three values from their two changes, which are partly random; infinite without a value.
+    """Return the error of the first of three values from their two changes, which are partly random; infinite if a change is unknown.
 
-    If later changes keep falling at the same ratio, they form a geometric series; `least` is the lower bound of its sum over the first change.
+    Further changes are taken as a geometric series with the ratio of the two; `least` is the lower bound of its sum over the first change.
     """
     if not np.isfinite(first + second):
         return np.inf
@@ -429,20 +428,20 @@ def _scattered(first: float, second: float, least: float) -> float:
 
 
 def _opens(image: Image) -> bool:
-    """Return whether a contact is open for a part of the period, where its normal force is zero."""
+    """Whether a contact is open (zero normal force) for a part of the period."""
     is_open = image.record.force[:, :, 2] == 0.0
     return bool(np.any(np.any(is_open, axis=0) & ~np.all(is_open, axis=0)))
 
 
 def _jumps(image: Image) -> bool:
-    """Return whether a friction force jumps within a step from its largest value to the opposite one."""
+    """Whether a friction force jumps within a step from one slip limit to the opposite one."""
     force = image.record.force[:, :, :2]
     largest = np.max(np.abs(force), axis=0, initial=0.0)
     return bool(np.any(np.abs(np.diff(force, axis=0)) > JUMP * largest[None]))
 
 
 def harmonics(mapping: PeriodMap, state: FloatArray, image: Image, outputs: IntArray, order: int) -> ComplexArray:
-    """Return the (order + 1, n_outputs) harmonics of a period from a state, m."""
+    """Return the (order + 1, n_outputs) harmonics of the period that begins with `state`, m."""
     marcher = mapping.marcher
     began = mapping.start_of(state).x[: marcher.n]
     modal = period_harmonics(began, image.record.motion, order)

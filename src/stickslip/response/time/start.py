@@ -18,9 +18,9 @@ from stickslip.errors import input_error
 from stickslip.response.time.stepping.contact_step import KERNEL, PARAMETERS, STATES, TimeContacts, time_contacts
 from stickslip.response.time.stepping.propagator import require_array
 
-SAMPLES = 1024  # of a period over which laws are marched
-MOST_PERIODS = 50  # of a march; what is forgotten more slowly the motion itself settles
-REPEATS = 1e-9  # change of a law's state over a period, relative to its size, that counts as none
+SAMPLES = 1024  # of the gaps in a period
+MOST_PERIODS = 50  # largest number of evaluated periods; slower states settle during the integration
+REPEATS = 1e-9  # relative change of a law's state over a period that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,8 @@ class TransientStart:
     displacement, velocity
         (n,) in m and m/s.
     states
-        One array (n_state,) a contact: what its law remembers, as of `initial_state` of the law. Where that holds NaN, NaN lets
-        the law settle it at t = 0.
+        One array (n_state,) for each contact: the state of its law, as in the law's `initial_state`. An entry that is NaN there may
+        be NaN here: the law then determines it at t = 0.
     """
 
     displacement: FloatArray
@@ -50,9 +50,9 @@ def rest(n: int, laws: Sequence[ContactLaw]) -> TransientStart:
 def start_from_harmonics(
     coefficients: ComplexArray, omega: float, gap_operator: Matrix, laws: Sequence[ContactLaw]
 ) -> TransientStart:
-    """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as that of a harmonic balance.
+    """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as a solution of a harmonic balance.
 
-    The laws are marched along its gaps until their states repeat. With the balance's `problem` and `point`, the amplitudes of
+    The laws are evaluated along the gaps until their states repeat. For a `point` of a forced response `problem`, the amplitudes of
     all dofs are ``problem.low.linear.recover(point.omega, point.coefficients)``.
 
     Parameters
@@ -64,7 +64,7 @@ def start_from_harmonics(
     gap_operator
         (3 n_contacts, n), dense or sparse: rows t, w, n of each contact.
     laws
-        One law a contact.
+        One law for each contact.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def start_from_harmonics(
 
 
 def settled_states(contacts: TimeContacts, gaps: ComplexArray, rates: ComplexArray) -> FloatArray:
-    """Return the states of all laws just before t = 0 of a periodic motion of their gaps.
+    """Return the states of all laws just before t = 0 of periodic gaps.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def settled_states(contacts: TimeContacts, gaps: ComplexArray, rates: ComplexArr
 
 
 def _march_period(address, parameters, gap, rate, state):  # type: ignore[no-untyped-def]
-    """Carry the state of one contact over samples of its gap, in place."""
+    """Update the state of one contact along samples of its gap, in place."""
     step = law_at(address)
     new, force = np.empty_like(state), np.empty(3)
     jac, status = np.zeros((3 + state.size, 6 + state.size)), np.zeros(2, np.int64)
@@ -129,7 +129,7 @@ def _march() -> Any:
 
 
 def check_start(start: TransientStart, n: int, contacts: TimeContacts, caller: str) -> None:
-    """Refuse a start of another shape or with numbers that are none; only states that a law leaves open may be NaN."""
+    """Refuse a start of wrong shape or with non-finite numbers; only states that the law leaves open may be NaN."""
     given_type: object = start
     if not isinstance(given_type, TransientStart):
         raise input_error(

@@ -1,12 +1,11 @@
-"""Direct time integration, without harmonics: it shares with the balance only the matrices and the contact laws.
+"""Direct time integration; it shares only the matrices and the contact laws with the harmonic balance.
 
-The linear part, with every contact stuck, is propagated exactly over a step by a matrix exponential, whatever the damping
-matrix and however stiff the modes; so are the periodic loads. What is left of the contact force, its departure from the
-stuck springs, is interpolated linearly over the step (first-order hold) and solved for implicitly. A contact that sticks
-is then integrated without error. One that slips or is open is not: its departure is curved, and the line in its place acts
-like a mass ``k h²/12`` too little on the spring; the switches between states add another error of second order in the step.
-Springs that with the mass they act on vibrate much faster than the load are therefore no part of the linear structure:
-their force is held at the mean of both ends of the step, which does the work that their energy changes by.
+A matrix exponential propagates the linear structure with all contacts stuck, and the periodic loads, exactly over a step, for any
+damping matrix and any stiffness. The remaining contact force, minus the force of the stuck springs, is interpolated linearly over
+the step (first-order hold) and solved implicitly. Sticking contacts are thus integrated without error. For slipping and open contacts,
+the linear interpolation of a curved force reduces the mass on the spring by about ``k h²/12``; changes of state add another error of
+second order in the step. Contact springs that vibrate much faster than the load with their effective mass are therefore no part of the
+linear structure: their force is the mean of both ends of the step, which conserves energy.
 """
 
 from collections.abc import Sequence
@@ -26,31 +25,31 @@ from stickslip.response.time.stepping.marcher import FINE, Marcher, Record, prep
 from stickslip.response.time.stepping.propagator import PeriodicLoad
 from stickslip.units import check_quantities, quantity
 
-MOST_STEPS = 10_000_000  # a period of which fills the memory of a large machine
-DRIFT_THRESHOLD = 1e-4  # of a coordinate's own swing, per period
+MOST_STEPS = 10_000_000  # a period with so many steps fills the memory of a large computer
+DRIFT_THRESHOLD = 1e-4  # drift per period over a coordinate's swing
 
 
 @dataclass(frozen=True)
 class TimeStepping:
-    """How finely and how long to integrate.
+    """Step length and duration of a time integration.
 
     Parameters
     ----------
     steps_per_period
-        Steps in a period of the excitation. Impacts on stiff springs need several of them while they last; where a sliding contact
-        turns within a step, the error is of first order.
+        Steps in a period of the excitation. An impact on a stiff spring needs several steps; where a sliding contact reverses within a
+        step, the error is of first order.
     max_periods
-        Give up settling after this many periods.
+        Largest number of periods.
     tolerance
-        The harmonics that the load drives (without one: the first) count as settled when what is left of their change, relative to
-        their largest amplitude, is below this.
+        The driven harmonics (without a load: the first) are settled when their estimated remaining change, relative to the largest
+        amplitude, is below this.
     harmonics
         Highest harmonic reported.
     min_periods
         Smallest number of periods, also for a settled motion: a disturbance may need them to grow.
     every_harmonic
-        Judge all reported harmonics but the mean, not those that the load drives alone: of a motion over several periods of the load the
-        others hold what is its own.
+        Judge all reported harmonics except the mean, not the driven ones only: a motion over several periods of the load shows in the
+        others.
     """
 
     steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
@@ -69,31 +68,31 @@ class TimeStepping:
 
 @dataclass(frozen=True, eq=False)
 class TransientResult:
-    """The last period of an integration.
+    """Last period of a time integration.
 
     Parameters
     ----------
     status
-        ``settled``: the harmonics that the load drives have become periodic; ``unsettled``: the periods ran out; ``diverged``: the motion
-        overflowed, and all arrays are NaN.
+        ``settled``: the driven harmonics have become periodic; ``unsettled``: the periods ran out; ``diverged``: the motion overflowed,
+        and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes over the last period, m.
     average
-        (n_outputs,) first harmonic averaged over the last third of the periods, m: the number to use where undamped
-        modes of a damper on its contact springs go on ringing and nothing settles.
+        (n_outputs,) first harmonic averaged over the last third of the periods, m: the value to use if undamped modes of a damper on its
+        contact springs keep vibrating and nothing settles.
     averages
-        (n_h + 1, n_outputs) the same of all harmonics.
+        (n_h + 1, n_outputs) averages of all harmonics, m.
     scatter
-        Largest distance of a period's driven harmonics from that average, relative to it.
+        Largest relative distance of a period's driven harmonics from the average.
     periods
         Number of periods integrated.
     change
         Largest relative change of the driven harmonics from one period to the next over the last few periods.
     remaining
-        Sum of the changes still to come, if they continue to decay at the same rate (see `stickslip.response.time.settling`).
+        Sum of all future changes if they decay at the same rate (see `stickslip.response.time.settling`).
     decay
-        Largest such change of the last third of the periods over that of the third before: what goes on ringing has 1, what grows
-        more. NaN where the periods are too few.
+        Largest change in the last third of the periods over the third before: 1 for persistent vibration, more for growing motion. NaN if
+        there are too few periods.
     contact_failures
         Time steps in which the contact equations were not solved to rounding.
     drift
@@ -103,14 +102,14 @@ class TransientResult:
     labels
         n names of the coordinates.
     final
-        State at the end, from which an integration can go on.
+        State at the end, from which an integration can continue.
     outputs
         (steps, n_outputs) displacements over the last period, at t = T/steps, 2T/steps, ... T; m.
     gap, contact_force
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     step_angle
-        Phase angle per step, rad, of the fastest contact that opens or closes in the last period: the frequency of its stiffness and the
-        mass that moves with it, times the step. See `stickslip.response.time.stepping.marcher`.
+        Phase angle per step, rad, of the fastest contact that opens or closes in the last period: frequency of its stiffness and
+        effective mass, times the step. See `stickslip.response.time.stepping.marcher`.
     """
 
     status: SettlingStatus
@@ -134,12 +133,12 @@ class TransientResult:
 
     @property
     def coarse(self) -> bool:
-        """Whether the step is too long to follow the impacts of the stiffest contact that opens: harmonics may be off by a percent."""
+        """Whether the step is too long for the impacts of the stiffest opening contact: harmonics may have an error of a percent."""
         return self.step_angle > FINE
 
     @property
     def settled(self) -> bool:
-        """Whether the harmonics that the load drives have become periodic."""
+        """Whether the driven harmonics have become periodic."""
         return self.status == "settled"
 
     @property
@@ -162,16 +161,16 @@ def integrate(  # noqa: PLR0913
     *,
     weights: FloatArray | None = None,
 ) -> TransientResult:
-    """Integrate ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` until the outputs are periodic in the harmonics that the load drives.
+    """Integrate ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` until the driven harmonics of the outputs are periodic.
 
     Parameters
     ----------
     structure
-        Any linear structure with a regular mass matrix; free rigid bodies are welcome. Of a wheel, that of all its sectors.
+        Any linear structure with a regular mass matrix; free rigid bodies are allowed. For a wheel, the structure of all sectors.
     gap_operator
         (3 n_contacts, n), dense or sparse: rows t, w, n of each contact; normal gap positive when open.
     laws
-        One law a contact, of any kind but `RigidCoulomb`, which has no stiffness.
+        One law for each contact, of any kind except `RigidCoulomb`, which has no stiffness.
     load
         Static and harmonic loads.
     omega
@@ -181,7 +180,7 @@ def integrate(  # noqa: PLR0913
     start
         State at t = 0; rest if None.
     stepping
-        Step, patience and tolerance.
+        Step, number of periods and tolerance.
     weights
         (n_contacts,) factors of the contact forces, such as the areas of an `Interface`; None: ones.
 
@@ -203,7 +202,7 @@ def integrate(  # noqa: PLR0913
 def _settle(
     marcher: Marcher, state: StepState, outputs: IntArray, stepping: TimeStepping, judged: tuple[int, ...]
 ) -> TransientResult:
-    """March period by period until the remaining change of the judged harmonics is below the tolerance."""
+    """Integrate period by period until the remaining change of the judged harmonics is below the tolerance."""
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
     now = Progress(unknown, np.full(n, np.nan), judged=judged)
@@ -212,7 +211,7 @@ def _settle(
         failed = marcher.march(state, record)
         if failed < 0 or overflowed(state.x, record.motion):
             now.periods, now.status = now.periods + 1, "diverged"
-            for array in (state.x, state.law, record.rows):  # infinities are no numbers to go on with
+            for array in (state.x, state.law, record.rows):  # no infinities in results
                 array.fill(np.nan)
             break
         modal = period_harmonics(began, record.motion, stepping.harmonics)
@@ -221,7 +220,7 @@ def _settle(
 
 
 def _result(marcher: Marcher, state: StepState, record: Record, outputs: IntArray, now: Progress) -> TransientResult:
-    # a number that overflowed later was none before
+    # values before an overflow are meaningless, too
     known = np.nan if now.status == "diverged" else 1.0
     motion = record.motion @ marcher.modes.basis.T
     return TransientResult(

@@ -1,1 +1,1 @@
-"""The compiled time step and its parts."""
+"""Compiled time step and its parts."""

@@ -1,8 +1,8 @@
-"""Any contact law over one time step: force, new state and their derivatives at a guess of the gap at its end.
+"""Evaluation of any contact law over one time step: force, new state and their derivatives for a given gap at the end.
 
-A law forgets its state at lift-off. After the next closure friction counts from the gap at closure; counted from the sample before, the
-force would have an error of first order for as long as the contact sticks. A step with a closure is therefore evaluated in two parts: to
-the point of the straight gap path where the normal force begins, and on from there.
+A law forgets its state at lift-off, and after closure its friction refers to the gap at closure. A reference to the previous sample would cause an
+error of first order in the force for as long as the contact sticks. A step with a closure is therefore evaluated in two parts: up to the point of the
+straight gap path where the normal force begins, and from there to the end.
 """
 
 from collections.abc import Sequence
@@ -18,51 +18,51 @@ from stickslip.contact.compiled import checked_weights
 from stickslip.contact.law import OPEN, ContactLaw, Rigid
 from stickslip.errors import input_error
 
-# what compiled code alone calls is compiled with it, and needs no door to Python
+# functions called by compiled code only need no Python wrapper
 _compiled: Any = njit
 inner = _compiled(no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy", forceinline=True)
 large = _compiled(no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy")
-LANDING_STEPS = 8  # of Newton's method for the share of the step; one where the normal force is linear in the gap
-LOCATED = 1e-13  # of the step
+LANDING_STEPS = 8  # most Newton steps for the time of closure; one suffices if the normal force is linear in the gap
+LOCATED = 1e-13  # tolerance of the time of closure, over the step
 KERNEL, PARAMETERS, STATES, JAC, ENTRY = range(5)  # rows of `ContactTable.places`
-GAP, RATE, FORCE = range(3)  # rows of what a contact shows
-_AT_END, _CLOSING, _FROM_THERE = range(3)  # questions to a law
+GAP, RATE, FORCE = range(3)  # rows of `StepState.seen`
+_AT_END, _CLOSING, _FROM_THERE = range(3)  # evaluations of a law: over the step, up to closure, from closure on
 
 
 class ContactTable(NamedTuple):
-    """The laws of n contacts as arrays."""
+    """Laws of n contacts as arrays."""
 
-    places: IntArray  # (5, n + 1): address of the kernel of each contact; where its parameters, states and derivatives begin in their arrays
-    parameters: FloatArray  # of all contacts, one after the other
+    places: IntArray  # (5, n + 1): address of each contact's kernel; offsets of its parameters, states and derivatives
+    parameters: FloatArray  # of all contacts, in sequence
     weight: FloatArray  # (n,) factors of the forces
     stuck: FloatArray  # (3 n,) stiffnesses of the contacts that neither slip nor open, N/m, with the weights
     springs: FloatArray  # (3 n,) stiffnesses that the linear structure has at the contacts, N/m, with the weights
 
 
 class StepState(NamedTuple):
-    """State between steps; r is the contact force minus that of the springs of the linear structure."""
+    """State between steps; r is the contact force minus the force of the springs in the linear structure."""
 
     x: FloatArray  # (m + 3 n,) motion and r
     seen: FloatArray  # (3, 3 n) gap, rate, force
     law: FloatArray  # states of the laws of all contacts
-    status: IntArray  # (n, 2) what each tangent does
+    status: IntArray  # (n, 2) contact status by tangent
 
 
 class LawWork(NamedTuple):
     """Forces and derivatives of the laws at an iterate, and work arrays."""
 
     seen: FloatArray  # (3, 3 n) gap and rate of the iterate, force
-    law: FloatArray  # (2, n_states) states after the step, and where a gap closes
-    status: IntArray  # (n + 1, 2); the last row where a gap closes
-    jac: FloatArray  # (3 + s, 6 + s) derivatives by gap, rate and state, then (3 + s, 6) by gap and rate before, by contact
-    there: FloatArray  # derivatives where a gap closes
-    landed: IntArray  # (n,) whether the derivatives by what was before count
-    place: FloatArray  # (5, 3): gap, rate and force there, way of the gap over the step, gradient of the normal force
+    law: FloatArray  # (2, n_states) states after the step, and at closure
+    status: IntArray  # (n + 1, 2); the last row at closure
+    jac: FloatArray  # for each contact (3 + s, 6 + s) derivatives by gap, rate and state, then (3 + s, 6) by initial gap and rate
+    there: FloatArray  # derivatives at closure
+    landed: IntArray  # (n,) whether the derivatives by initial gap and rate are used
+    place: FloatArray  # (5, 3): gap, rate and force at closure, change of the gap over the step, gradient of the normal force
 
 
 @inner
 def _way(c, state, work, jac):  # type: ignore[no-untyped-def]
-    """Write the gap path over the step and the gradient of its normal force; return the share of the force along the path."""
+    """Write the change of the gap over the step and the gradient of the normal force; return their product."""
     slope = 0.0
     for d in range(3):
         work.place[3, d] = work.seen[GAP, 3 * c + d] - state.seen[GAP, 3 * c + d]
@@ -75,7 +75,8 @@ def _way(c, state, work, jac):  # type: ignore[no-untyped-def]
 def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-def]
     """Convert derivatives by the state at closure into derivatives by gap, rate and state before the step.
 
-    The point of closure moves with the path; the component of its change along the path vanishes, since the time of closure moves.
+    The point of closure changes with the path. The component of this change along the path is removed, since the time of closure
+    changes, too.
     """
     n_state, along = there.shape[0] - 3, 0.0
     for d in range(3):
@@ -88,9 +89,7 @@ def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-de
             there[3 + s, d] -= lost * normal[d]
     for a in range(jac.shape[0]):
         for s in range(n_state):
-            there[0, 6 + s] = jac[
-                a, 6 + s
-            ]  # kept while its place is written to: a row of the force, which is not needed
+            there[0, 6 + s] = jac[a, 6 + s]  # copied to an unused row of the force before its place is overwritten
             jac[a, 6 + s] = 0.0
         for s in range(n_state):
             by_state = there[0, 6 + s]
@@ -105,7 +104,7 @@ def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-de
 def evaluate(table, state, work):  # type: ignore[no-untyped-def]  # noqa: C901, PLR0912, PLR0915
     """Fill `work` with forces, new states and derivatives of all contacts at the iterate of gap and rate.
 
-    The law is called at a single place of the code, since each call would be compiled separately.
+    The law is called at a single place in the code, since each call would be compiled separately.
     """
     places, n = table.places, table.weight.size
     for c in range(n):
@@ -152,7 +151,7 @@ def evaluate(table, state, work):  # type: ignore[no-untyped-def]  # noqa: C901,
                 break
             tries += 1
             if asked == _AT_END or (status[0] != OPEN and tries <= LANDING_STEPS):
-                # the force on the way back to where it begins
+                # Newton step back along the path to the point where the normal force begins
                 slope = _way(c, state, work, answer)
                 if slope == 0.0:
                     break
@@ -225,11 +224,11 @@ def time_contacts(laws: Sequence[ContactLaw], weights: FloatArray | None, caller
     Parameters
     ----------
     laws
-        One law a contact.
+        One law for each contact.
     weights
         (n_contacts,) factors of the forces; None: ones.
     caller
-        Public function that errors name.
+        Public function named in errors.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""A structure with contacts, prepared for time stepping with a step that follows its impacts.
+"""Structure with contacts, prepared for time integration with a step that resolves impacts.
 
-A contact of stiffness k with the effective mass m vibrates at √(k/m); an impact lasts half such a vibration. The accuracy depends on the
-angle ``√(k/m) h``. For masses on stops the error against an integrator with exact events (`tests/test_step_choice.py`) is below 1 % for
-angles below `FINE`, and 2 % below `ROUGH`. Contacts that stay closed or slip need no fine steps.
+A contact of stiffness k vibrates with its effective mass m at √(k/m), and an impact lasts half a period of this vibration. The accuracy with a step h
+depends on the angle ``√(k/m) h``. For masses on stops, the error against an integrator with exact events (`tests/test_step_choice.py`) is below 1 % for
+angles up to `FINE`, and below 2 % up to `ROUGH`. Contacts that stay closed, and contacts that slip, need no fine steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,21 +30,21 @@ from stickslip.response.time.stepping.time_step import (
     run_steps,
 )
 
-STEP_FLOPS = 1e4  # of a step, however small the structure is
-LOG_NUMBERS = 4_000_000  # kept of the laws' derivatives before they are used up: 32 MB
+STEP_FLOPS = 1e4  # least work of a step
+LOG_NUMBERS = 4_000_000  # entries of the log of the laws' derivatives: 32 MB
 FINE, ROUGH = 0.2, 0.3  # rad
-LOOK = 4  # periods after which contacts that open and close are known
+LOOK = 4  # periods that show which contacts open and close
 MOST_STEPS = 8192  # in a period
 
 
 def step_work(coordinates: int, gaps: int) -> float:
-    """Return an estimate of the floating point operations of a step, from the coordinates of the structure and the gaps (three a contact)."""
+    """Estimate the floating-point operations of a step from the numbers of coordinates and gaps (three for each contact)."""
     return STEP_FLOPS + 8.0 * coordinates**2 + float(gaps) ** 3
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A period, sampled at the end of every step.
+    """Samples of a period at the end of every step.
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Marcher:
-    """A structure with contacts, prepared for time stepping.
+    """Structure with contacts, prepared for time integration.
 
     Parameters
     ----------
     operators, modes, contacts
-        Matrices of a step, their coordinates, and the laws.
+        Matrices of a step, their modal coordinates, and the laws.
     labels
         Names of the coordinates.
     """
@@ -113,7 +113,7 @@ class Marcher:
 
     @property
     def slowest(self) -> float:
-        """Share of the slowest free motion that remains after a period, contacts stuck."""
+        """Decay factor per period of the slowest free motion with contacts stuck."""
         step = np.linalg.eigvals(self.operators.transfer[: 2 * self.n])
         return float(np.abs(step).max(initial=0.0) ** self.steps)
 
@@ -123,9 +123,9 @@ class Marcher:
         return self.steps * step_work(self.n, self.k)
 
     def turn(self, record: Record) -> float:
-        """Return the largest phase within a step of a contact that opens or closes in a record, rad: contact frequency times step.
+        """Return the largest phase angle per step, rad, of the contacts that open or close in a record: contact frequency times step.
 
-        Where it is large the step cannot follow an impact; see `stickslip.response.time.stepping.marcher`.
+        If it is large, the step does not resolve impacts; see `stickslip.response.time.stepping.marcher`.
         """
         shut = record.force[:, :, 2] != 0.0
         hits = np.any(shut, axis=0) & ~np.all(shut, axis=0)
@@ -141,14 +141,14 @@ class Marcher:
     def begin(self, motion: FloatArray, law: FloatArray) -> tuple[StepState, FloatArray]:
         """Return a state with the contact forces of its gaps, rates and law states (n_states,), and the derivatives of the laws."""
         seen = np.vstack([(self.modes.seen @ motion).reshape(2, self.k), np.zeros((1, self.k))])
-        status = np.full((self.contacts.n, 2), -1)  # as if it had not been open before
+        status = np.full((self.contacts.n, 2), -1)  # not open before
         state = StepState(np.concatenate([motion, np.zeros(self.k)]), seen, law.copy(), status)
         log = self._log(1)
         self._run(state, self.record(0), log, {BEGIN: 1, LOGS: 1})
         return state, log.jac[0]
 
     def end(self, state: StepState) -> TransientStart:
-        """Return a state as the start of another march."""
+        """Return a state as the start of another integration."""
         displacement, velocity = self.modes.physical(state.x[: 2 * self.n])
         states = tuple(s.copy() for s in self.contacts.separate(state.law))
         return TransientStart(displacement, velocity, states)
@@ -164,7 +164,7 @@ class Marcher:
         return int(plan[FAILED])
 
     def march_logged(self, state: StepState, record: Record, use: Callable[[StepLog, int], None]) -> int:
-        """March like `march`, and pass on the log of the derivatives of the laws with its number of rows whenever it is full."""
+        """Integrate like `march`; pass the log of the laws' derivatives and its number of rows to `use` whenever it is full."""
         steps, taken, failures = len(record.rows), 0, 0
         log = self._log(max(1, min(steps, LOG_NUMBERS // max(self.contacts.log_width, 1))))
         while taken < steps:
@@ -196,12 +196,12 @@ def prepared(
     weights: FloatArray | None = None,
     caller: str = "integrate",
 ) -> Marcher:
-    """Return the prepared structure with `steps` steps a period; other arguments as in `integrate`.
+    """Return the prepared structure with `steps` steps in a period; other arguments as in `integrate`.
 
     Parameters
     ----------
     caller
-        Public function that errors name.
+        Public function named in errors.
     """
     one = one_structure(structure, caller)
     laid = time_contacts(laws, weights, caller)
@@ -220,13 +220,13 @@ def with_enough_steps(
     Parameters
     ----------
     made
-        Function that prepares the structure with a number of steps a period.
+        Function that prepares the structure with a given number of steps in a period.
     start
-        Initial state of the motion.
+        Initial state.
     least
-        Least number of steps in a period; it is doubled as often as necessary, up to `MOST_STEPS`.
+        Smallest number of steps in a period; it is doubled as needed, up to `MOST_STEPS`.
     angle
-        Largest angle, rad.
+        Largest phase angle per step, rad.
     """
     marcher = made(least)
     state, record, seen = marcher.begun(start), marcher.record(), 0.0

@@ -14,14 +14,14 @@ from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.response.time.stepping.time_step import StepOperators
 
-# times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
+# frequency of a contact spring with its effective mass over the load frequency, above which it is no part of the linear structure
 FAST = 10.0
 
-COUPLED = 1e-12  # of a mode's motion that a step gives to another: less is rounding
+COUPLED = 1e-12  # coupling of two modes in a step, below which it is rounding
 
 
 class PeriodicLoad(Protocol):
-    """Any load ``f(t) = static + Re Σ_h harmonics[h] e^{ihωt}``, N."""
+    """Load ``f(t) = static + Re Σ_h harmonics[h] e^{ihωt}``, N."""
 
     @property
     def static(self) -> FloatArray:
@@ -29,7 +29,7 @@ class PeriodicLoad(Protocol):
 
     @property
     def harmonics(self) -> Mapping[int, ComplexArray]:
-        """Order -> (n,) complex amplitudes."""
+        """Mapping from order to (n,) complex amplitudes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,10 @@ class ModalCoordinates:
 
     basis: FloatArray  # (n, n), mass-normalised
     inverse: FloatArray  # (n, n) = basisᵀ M
-    speed: FloatArray  # (n,) scale of w, which keeps the propagator of a stiff mode near a rotation
+    speed: FloatArray  # (n,) scale of w, so that the propagator of a stiff mode is nearly a rotation
     seen: FloatArray  # (2k, 2n): gaps and their rates of a motion
     omega: float
-    paces: FloatArray  # (k,) frequency of a gap on its contact's spring and the mass that moves with it alone, rad/s
+    paces: FloatArray  # (k,) frequency of each contact spring with the effective mass of its gap, rad/s
 
     def motion(self, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return (q, w) of physical displacement and velocity."""
@@ -54,7 +54,7 @@ class ModalCoordinates:
 
 
 def require_array(name: str, array: FloatArray | ComplexArray, shape: tuple[int, ...]) -> None:
-    """Refuse an array of another shape or with entries that are not finite."""
+    """Refuse an array of another shape or with non-finite entries."""
     if np.shape(array) != shape:
         raise input_error(name, f"has shape {np.shape(array)}", f"It must be {shape}.")
     if not np.all(np.isfinite(array)):
@@ -66,7 +66,7 @@ def _dense(matrix: Matrix) -> FloatArray:
 
 
 def _paces(structure: Structure, gap_operator: FloatArray, stuck: FloatArray) -> FloatArray:
-    """Return the frequency of each gap on the spring of its contact, rad/s, with the effective mass ``1 / B M⁻¹ Bᵀ``."""
+    """Return the frequency of each contact spring with the effective mass ``1 / B M⁻¹ Bᵀ`` of its gap, rad/s."""
     mass = _dense(structure.mass)
     try:
         root = scipy.linalg.cholesky(mass, lower=True)
@@ -104,14 +104,14 @@ def step_operators(
     steps: int,
     caller: str = "integrate",
 ) -> tuple[StepOperators, ModalCoordinates, FloatArray]:
-    """Return the matrices of one of `steps` time steps in a period, their coordinates, and the springs (3 n_contacts,) in them.
+    """Return the matrices of a time step, their coordinates, and the springs (3 n_contacts,) in them; a period has `steps` steps.
 
     Parameters
     ----------
     stuck
         (3 n_contacts,) stiffness of sticking contacts, N/m; other arguments as in `integrate`.
     caller
-        Public function that errors name.
+        Public function named in errors.
     """
     if structure.loss is not None:
         raise input_error(
@@ -122,8 +122,8 @@ def step_operators(
     gap_operator = _dense(gap_operator)
     _check(structure.n, gap_operator, stuck.size, load, omega, caller)
     paces = _paces(structure, gap_operator, stuck)
-    # as a part of the linear structure a spring that does not slip is exact; one that slips acts like a mass k h²/12 too little,
-    # which must be little of the mass that it acts on
+    # in the linear structure a sticking spring is exact, while a slipping one reduces the mass by about k h²/12,
+    # which must be small against its effective mass
     springs = np.where(paces > FAST * omega, 0.0, stuck)
     stiffness = _dense(structure.stiffness) + gap_operator.T @ (springs[:, None] * gap_operator)
     modes = _coordinates(structure, stiffness, gap_operator, paces, omega)
@@ -132,7 +132,7 @@ def step_operators(
     motion = _motion_matrix(modes.basis.T @ stiffness @ modes.basis, damping, modes)
     exponential = _step_exponential(motion, seen[:k, :n], modes, load, 2 * np.pi / steps)
     constant, line = exponential[:, m : m + k], exponential[:, m + k : m + 2 * k]
-    # a line would make fast springs unstable; with the mean of both ends they do the work that their energy changes by
+    # linear interpolation would make fast springs unstable; the mean of both ends conserves their energy
     hold = np.where(springs == stuck, line, constant / 2)
     transfer = np.hstack([exponential[:, :m], constant - hold])
     drive = _clock(sorted(load.harmonics), steps) @ exponential[:, m + 2 * k :].T
@@ -158,7 +158,7 @@ def _turn(step: FloatArray) -> FloatArray:
 
 
 def _motion_matrix(stiffness: FloatArray, damping: FloatArray, modes: ModalCoordinates) -> FloatArray:
-    """Matrix A of ``d(q, w)/dτ = A (q, w)`` in the time ``τ = ωt``, from modal stiffness and damping."""
+    """Return the matrix A of ``d(q, w)/dτ = A (q, w)`` in the time ``τ = ωt``, from modal stiffness and damping."""
     speed, omega = modes.speed[:, None], modes.omega
     free = np.hstack([np.zeros_like(stiffness), np.diag(modes.speed)])
     forced = np.hstack([-stiffness / (omega**2 * speed), -damping * speed.T / (omega * speed)])

@@ -1,7 +1,7 @@
-"""Newton's matrix of a time step: derivatives of the contact forces at its end, LU, and steps with it; compiled, without allocations.
+"""Newton matrix of a time step: derivatives of the contact forces, LU factors and steps; compiled, without allocations.
 
-Of many contacts only few change their state in a step. The LU is then kept, and changed rows of the matrix enter by a small system
-(Woodbury formula), until they are a quarter of all rows.
+In a step, only few of many contacts change their state. The LU is then kept, and the Woodbury formula corrects changed rows, until they
+are a quarter of all rows.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -13,18 +13,18 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.response.time.stepping.contact_step import JAC, STATES, inner, large
 
-SHARE = 4  # rows that differ from the LU are at most one in so many
+SHARE = 4  # at most one row in SHARE may differ from the LU
 
 
 class Changes(NamedTuple):
-    """Rows in which Newton's matrix differs from the factorised one, at most `most`."""
+    """Rows in which the Newton matrix differs from the factorised one, at most `most`."""
 
-    base: FloatArray  # (k, 6): slopes that the LU belongs to; NaN before the first
-    taken: IntArray  # (1,) how many differ
-    place: IntArray  # (k,) of a row among those that differ, -1 where it does not
-    row: IntArray  # (most,) which they are
-    unit: FloatArray  # (most, k): solution of the LU for a unit in that row
-    less: FloatArray  # (most, k): what the matrix has less than that of the LU there
+    base: FloatArray  # (k, 6): slopes in the LU; NaN before the first
+    taken: IntArray  # (1,) number of changed rows
+    place: IntArray  # (k,) position of a row among the changed ones; -1: unchanged
+    row: IntArray  # (most,) indices of the changed rows
+    unit: FloatArray  # (most, k): solution by the LU for the unit vector of a changed row
+    less: FloatArray  # (most, k): factorised minus present matrix in the changed rows
     cross: FloatArray  # (most, most): less unitᵀ
     small: FloatArray  # (most, most): LU of I - cross, transposed
     pivot: IntArray  # (most,)
@@ -35,16 +35,16 @@ class NewtonWork(NamedTuple):
     """Work arrays of the contact solution, so that no step allocates."""
 
     moved: FloatArray  # (m,) motion at the end of the step, with r held zero there
-    free: FloatArray  # (2k,) gaps and rates then
+    free: FloatArray  # (2k,) gaps and rates of this motion
     r: FloatArray  # (k,) iterate
     defect: FloatArray  # (k,)
     moves: FloatArray  # (k,) change of the gaps by the defect
     slope: FloatArray  # (k, 6): derivative of r by gap and rate of its contact
-    factored: FloatArray  # (k, 6): the slopes that steps are taken with; NaN before the first
-    factor: FloatArray  # (k, k) LU of the Newton matrix, transposed: its columns lie together
+    factored: FloatArray  # (k, 6): slopes in the factors, changed rows included; NaN before the first
+    factor: FloatArray  # (k, k) LU of the Newton matrix, transposed for contiguous columns
     pivot: IntArray  # (k,)
     diagonal: FloatArray  # (k,) of the Newton matrix
-    stiff: FloatArray  # (1,) by how much more a gap would move if the laws did not hold against it: how much rounding counts
+    stiff: FloatArray  # (1,) largest diagonal entry, at least 1: factor on the rounding of the gaps
     changes: Changes
 
 
@@ -126,7 +126,7 @@ def _is_factored(work, i):  # type: ignore[no-untyped-def]
 
 @inner
 def _change_row(ops, work, i):  # type: ignore[no-untyped-def]
-    """Write the difference of row i of the LU and of the matrix, for a new row also the solution of its unit vector; return its index."""
+    """Write the difference of row i between LU and matrix; solve for the unit vector of a new row; return its index."""
     k, changes = work.r.size, work.changes
     at = changes.place[i]
     if at < 0:
@@ -177,7 +177,7 @@ def factor_slopes(ops, work):  # type: ignore[no-untyped-def]
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return the product of two vectors."""
     whole = a.size - a.size % 4
-    p, q, r, s = 0.0, 0.0, 0.0, 0.0  # four sums that do not wait for each other
+    p, q, r, s = 0.0, 0.0, 0.0, 0.0  # four independent sums for instruction-level parallelism
     for i in range(0, whole, 4):
         p += a[i] * b[i]
         q += a[i + 1] * b[i + 1]
@@ -190,7 +190,7 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 @large
 def _factor(lu, pivot, k):  # type: ignore[no-untyped-def]
-    """LU of the first k rows and columns with row pivoting, transposed."""
+    """Factorise the first k rows and columns of a transposed matrix by LU with row pivoting."""
     for j in range(k):
         best = j
         for i in range(j + 1, k):

@@ -1,7 +1,7 @@
-"""The derivative of a run of time steps, for `stickslip.response.time.shooting`.
+"""Derivative of a sequence of time steps, for `stickslip.response.time.shooting`.
 
-The tangent of a state has one column for each direction of its start. The derivatives of the laws, logged by the march, propagate it;
-successive steps with the same derivatives are combined by squaring their common matrix.
+The tangent of a state has one column for each initial direction. The logged derivatives of the laws propagate it; successive steps with
+the same derivatives are combined by squaring their common matrix.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,8 +14,8 @@ from stickslip.response.time.stepping.contact_step import ENTRY, JAC
 from stickslip.response.time.stepping.marcher import Marcher
 from stickslip.response.time.stepping.time_step import StepLog
 
-SINGLY = 6  # steps in a row up to which their matrix is not worth its making
-NUMBERS = 1 << 20  # of the matrices that are made of rows of a log at once: 8 MB
+SINGLY = 6  # successive steps up to which single steps are cheaper than their common matrix
+NUMBERS = 1 << 20  # matrix entries assembled from a log at once: 8 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class TangentOperators:
 class Block:
     """Positions of the logged derivatives of contacts with equal numbers of states."""
 
-    jac: IntArray  # (contacts, (3 + s) (6 + s)) places in a row of the log
+    jac: IntArray  # (contacts, (3 + s) (6 + s)) positions in a row of the log
     entry: IntArray  # (contacts, (3 + s) 6)
     gaps: IntArray  # (contacts, 6) columns of their gaps and rates
     states: IntArray  # (contacts, s)
@@ -100,7 +100,7 @@ def law_derivatives(rows: FloatArray, linear: TangentOperators, n_states: int) -
 
 
 def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
-    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of the beginning of a march."""
+    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of the initial state."""
     (laws,) = law_derivatives(row[None], linear, n_states)
     k, m = linear.springs.size, linear.seen.shape[1]
     by_motion = laws.force @ linear.seen - linear.springs[:, None] * linear.seen[:k]
@@ -156,7 +156,7 @@ def _many(
     tangent: FloatArray,
     linear: TangentOperators,
 ) -> FloatArray:
-    """Propagate motion and r over steps with constant states, by squaring ``x -> P x + Q c`` with their constant force c."""
+    """Propagate motion and r over steps with constant states and forces c, by squaring ``x -> P x + Q c``."""
     m, k = linear.hold.shape
     held = np.flatnonzero(np.any(laws.force_by_law, axis=1))
     constant = laws.force_by_law[held] @ tangent[m + k :]
@@ -210,7 +210,7 @@ def _step(
 
 
 def kept(monodromy: FloatArray, places: Sequence[int] | IntArray) -> IntArray:
-    """Return which of the states at `places` stay constant over the period, whatever the others are."""
+    """Return those of the states at `places` that stay constant over the period, independently of all others."""
     rows = monodromy[places].copy()
     rows[np.arange(len(places)), places] -= 1.0
     return np.asarray(np.asarray(places)[~np.any(rows, axis=1)])

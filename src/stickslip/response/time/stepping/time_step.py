@@ -1,8 +1,8 @@
-"""The compiled time step of `stickslip.response.time.transient`, for contacts of any law.
+"""Compiled time step of `stickslip.response.time.transient`, for contacts of any law.
 
-The linear structure with all contacts stuck is propagated exactly. The contact force beyond the stuck springs, r, is linear within the
-step, and its value at the end is the unknown: it must equal the force of the laws at the resulting gaps and rates. A sticking contact
-has the same r for any gap.
+The linear structure with all contacts stuck is propagated exactly. The contact force minus the force of the stuck springs, r, is linear
+within the step, and its value at the end is the unknown: it must agree with the laws at the resulting gaps and rates. For a sticking
+contact, r does not depend on the gap.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -36,39 +36,39 @@ from stickslip.response.time.stepping.step_newton import (
     slopes,
 )
 
-# Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
+# Newton steps at full length before a cycle between contact states is broken, first by sticking, then by half steps
 FULL_STEPS = 12
 NEWTON_STEPS = 60
-GAP_TOLERANCE = 1e-12  # of the largest gap: some hundred roundings
+GAP_TOLERANCE = 1e-12  # relative to the largest gap: a few hundred roundings
 
 
 class StepOperators(NamedTuple):
     """Matrices of one step; state ``x = (motion, r)``."""
 
     transfer: FloatArray  # (m + k, m), transposed: x -> motion at the end, with r held zero there
-    drive: FloatArray  # (steps, m): what the loads add to that
+    drive: FloatArray  # (steps, m): motion due to the loads
     hold: FloatArray  # (k, m), transposed: r at the end of the step -> motion
     response: FloatArray  # (k, 2k), transposed: r at the end of the step -> gaps and rates
     gaps: FloatArray  # (k, m/2): displacements -> gaps
     rates: FloatArray  # (k, m/2): velocities -> rates of the gaps
-    turn: FloatArray  # (4, m/2): the motion's part of `transfer` where no mode moves another: q by q and w, w by q and w; else without rows
+    turn: FloatArray  # (4, m/2): part of `transfer` for uncoupled modes: q by q and w, w by q and w; (0, m/2) for coupled modes
 
 
 class StepLog(NamedTuple):
     """Derivatives of the laws in every step, stored once for successive steps with the same derivatives."""
 
     jac: FloatArray  # (rows, ...) as `LawWork.jac`
-    steps: IntArray  # (rows,) steps in a row
+    steps: IntArray  # (rows,) number of successive steps
 
 
-# what a run is to do, and what it did: whether to begin by asking the laws, first step, steps, whether to fill the log;
-# steps taken, steps in which the contacts were not solved (-1: overflow), rows of the log
+# entries of a plan. Task: whether to evaluate the laws at the start, first step, number of steps, whether to fill the log.
+# Result: steps taken, steps in which the contacts were not solved (-1: overflow), rows of the log
 BEGIN, FIRST, STEPS, LOGS, TAKEN, FAILED, ROWS = range(7)
 
 
 @inner
 def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
-    """``out += matrixᵀ x`` for all columns that fit, as plain loops: at this size the call of a threaded BLAS costs more than it saves."""
+    """Add ``matrixᵀ x`` to `out`, for as many columns as it has; at this size plain loops are faster than a threaded BLAS."""
     whole = x.size - x.size % 4
     for j in range(0, whole, 4):
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
@@ -81,7 +81,7 @@ def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
-    """Write the difference of r at the iterate from the force of the laws; return the largest change of a gap by it."""
+    """Write the defect of r against the laws at the iterate; return the largest change of a gap by it."""
     k, largest = work.r.size, 0.0
     for i in range(k):
         work.defect[i] = laws.seen[FORCE, i] - table.springs[i] * laws.seen[GAP, i] - work.r[i]
@@ -97,7 +97,7 @@ def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
 
 @inner
 def _at_guess(ops, laws, work):  # type: ignore[no-untyped-def]
-    """Write gaps and rates of the iterate; return the size of the gaps."""
+    """Write gaps and rates of the iterate; return the largest gap."""
     k, scale = work.r.size, 0.0
     for i in range(k):
         laws.seen[GAP, i], laws.seen[RATE, i] = work.free[i], work.free[k + i]
@@ -132,7 +132,7 @@ def _foresee(state, laws, work):  # type: ignore[no-untyped-def]
 
 @large
 def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
-    """Restart with all contacts stuck or open; steep laws have their solution between slip in both directions."""
+    """Restart with all contacts stuck or open: for steep laws the solution lies between slip in both directions."""
     k = work.r.size
     m = state.x.size - k
     for i in range(k):
@@ -146,10 +146,9 @@ def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
 
 @inner
 def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-untyped-def]
-    """Semi-smooth Newton for r at the end of a step; return whether it reached rounding.
+    """Solve for r at the end of a step by a semi-smooth Newton method; return whether it converged to rounding.
 
-    For piecewise-linear laws a step that ends in its initial states is exact. Without `solves` the laws are evaluated at the given gaps and
-    rates.
+    For piecewise-linear laws, a step without a change of state is exact. Without `solves`, only evaluate the laws at the given gaps and rates.
     """
     for iteration in range(-1, NEWTON_STEPS):
         if iteration == FULL_STEPS:
@@ -207,7 +206,7 @@ def _same(first, second):  # type: ignore[no-untyped-def]
 
 @large
 def _keep(log, laws, rows):  # type: ignore[no-untyped-def]
-    """Log the derivatives of a step; return the number of rows then."""
+    """Log the derivatives of a step; return the new number of rows."""
     if rows > 0 and _same(log.jac[rows - 1], laws.jac):
         log.steps[rows - 1] += 1
         return rows
@@ -219,7 +218,7 @@ def _keep(log, laws, rows):  # type: ignore[no-untyped-def]
 
 @inner
 def _write(row, state, n):  # type: ignore[no-untyped-def]
-    """Keep displacements, gaps and forces at the end of a step; return whether the state is finite."""
+    """Record displacements, gaps and forces at the end of a step; return whether the state is finite."""
     total, k = 0.0, state.seen.shape[1]
     for i in range(n):
         row[i] = state.x[i]
@@ -232,7 +231,7 @@ def _write(row, state, n):  # type: ignore[no-untyped-def]
 
 @inner
 def _predict(ops, state, work, step):  # type: ignore[no-untyped-def]
-    """Write motion, gaps and rates at the end of a step with zero r there; the first guess of r is its last value."""
+    """Write motion, gaps and rates at the end of a step with zero r there; the initial guess of r is its last value."""
     n, k, moved, free = ops.gaps.shape[1], work.r.size, work.moved, work.free
     for j in range(moved.size):
         moved[j] = ops.drive[step, j]
