@@ -9,7 +9,7 @@ from stickslip.study.file.section import Positive, Section, custom_error, once, 
 
 
 class AllMotionsTable(Section):
-    """Motions that a sweep does not meet, searched for within a budget, and which motion most starts end on."""
+    """Search, within a budget, for motions that a sweep does not meet, and for the basins of attraction of all motions."""
 
     frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
         description="the range [lowest, highest] in Hz of the sweep and of all branches"

@@ -8,12 +8,12 @@ from pydantic import Field, model_validator
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
 
 Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
-STEPS = 1024  # of a period, by shooting
+STEPS = 1024  # time steps of a period, by shooting
 RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
 
 
 class ForcedResponse(Section):
-    """Where the steady vibration under harmonic loads is computed."""
+    """Steady vibration under harmonic loads."""
 
     frequency_hz: Range | None = Field(None, description="the range [lowest, highest] in Hz, the lower frequency first")
     frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=10_000)] | None = Field(

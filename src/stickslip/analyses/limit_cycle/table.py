@@ -7,11 +7,11 @@ from pydantic import Field, model_validator
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.file.section import Positive, Section, once, rising_pair
 
-MODES = 6  # of each wave that are looked at where none is named
+MODES = 6  # modes of each wave that are examined, unless the study names modes
 
 
 class LimitCycleTable(Section):
-    """Motions that nothing drives: which amplitude friction holds them at, and where it cannot."""
+    """Self-excited motions: the amplitudes to which friction limits them, and the modes that it cannot limit."""
 
     wave_numbers: list[Annotated[int, Field(ge=0, le=999)]] | None = Field(
         None,

@@ -9,7 +9,7 @@ from stickslip.study.file.section import Positive, Section, rising_pair
 
 
 class ResidualTractionsTable(Section):
-    """How far the response depends on the tractions that sticking contacts have kept from before."""
+    """Bounds of the response over the residual tractions that sticking contacts may have kept from before."""
 
     frequency_hz: list[Positive] = Field(
         min_length=2,

@@ -9,7 +9,7 @@ from stickslip.study.file.section import Positive, Section, custom_error, once, 
 
 
 class ResonanceTable(Section):
-    """Resonance peaks over a design parameter, each followed from its own last one, without a sweep for each value."""
+    """Resonance peaks over a design parameter, each followed from value to value, without a sweep for each."""
 
     frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
         description="the range [lowest, highest] in Hz in which peaks are looked for at the first and the last value"

@@ -82,7 +82,7 @@ class CampbellTable(WaveTable):
 
 
 class SafeTable(WaveTable):
-    """Which modes engine orders can excite at one speed (SAFE, interference diagram)."""
+    """Modes that engine orders can excite at one speed (SAFE or interference diagram)."""
 
     speed_rpm: Speed | None = Field(None, description="speed in rpm, above zero; left out: as in [rotation]")
     engine_orders: list[Order] = Field(
