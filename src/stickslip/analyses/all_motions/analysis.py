@@ -18,7 +18,7 @@ from stickslip.units import HZ
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return the problem of a search; refuse what cannot be searched."""
+    """Return the problem of a search; refuse a case that cannot be searched."""
     question = question_of(case, model)
     LOG.info(f"all_motions: {_said(question)}")
     return question

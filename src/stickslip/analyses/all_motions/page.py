@@ -31,7 +31,7 @@ class Motions(Node):
 
     @property
     def names(self) -> list[str]:
-        """Of the branches."""
+        """Names of the branches."""
         return [
             f"{i + 1}: {'isola, ' * b.isola}{_ORIGIN.get(b.origin, b.origin)}"
             for i, b in enumerate(self.found.branches)
@@ -39,7 +39,7 @@ class Motions(Node):
 
 
 def branches(view: Motions) -> Plot:
-    """Show all branches, and the motions at the frequencies that were searched."""
+    """Draw all branches, and the motions at the searched frequencies."""
     figure, found = go.Figure(), view.found
     scale = scale_for(np.concatenate([branch.amplitude for branch in found.branches]), "m")
     for i, (name, branch) in enumerate(zip(view.names, found.branches, strict=True)):
@@ -75,7 +75,7 @@ def _several(count: int, one: str, more: str) -> str:
 
 
 def _mark(found: FoundMotions, figure: go.Figure, factor: float, unit: str) -> None:
-    """Mark the motions at the frequencies that were searched by their stability."""
+    """Mark the motions at the searched frequencies by their stability."""
     for word, symbol in _SYMBOLS.items():
         own = [(place, motion) for place, motion in found.motions if motion.stability == word]
         if not own:
@@ -93,7 +93,7 @@ def _mark(found: FoundMotions, figure: go.Figure, factor: float, unit: str) -> N
 
 
 def branch_table(view: Motions) -> Table:
-    """Return the branches."""
+    """Return a table of the branches."""
     rows = [
         [
             name,
@@ -109,7 +109,7 @@ def branch_table(view: Motions) -> Table:
 
 
 def basin_table(view: Motions) -> Table | Words:
-    """Return the motions at each frequency with the share of the starts that ends on them."""
+    """Return a table of the motions at each frequency, with the share of starts that end on them."""
     if not view.found.motions:
         return Words(("No motion was found at a frequency that was searched.",))
     rows = [row for place in view.found.places for row in _basins(place, view.names)]
@@ -127,7 +127,7 @@ def basin_table(view: Motions) -> Table | Words:
 
 
 def _basins(place: SearchedFrequency, names: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of a frequency: its motions, and what other starts end on."""
+    """Yield the rows of a frequency: its motions, and the outcome of the other starts."""
     hertz, starts = number(place.hertz, 6), place.starts
     for motion in place.motions:
         share, low, high = 100 * motion.share, 100 * motion.share_low, 100 * motion.share_high

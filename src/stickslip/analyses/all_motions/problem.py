@@ -32,7 +32,7 @@ class Question:
     label
         Label of the case.
     model
-        The assembled model; amplitudes are those of the first output.
+        The assembled model; amplitudes belong to its first output.
     search
         Options of the search.
     facts
@@ -95,7 +95,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _refuse_modes(asked: AllMotionsTable, model: Assembled) -> None:
-    """Refuse more modes than what is marched has, where they were asked for."""
+    """Refuse a requested number of modes above the degrees of freedom of the model in time."""
     if not_marched(model.system) or not asked.starts or "modes" not in asked.model_fields_set:
         return
     most = one_structure(model.system.structure, "all_motions").n

@@ -31,7 +31,7 @@ class FoundBranch:
 
     @property
     def swept(self) -> bool:
-        """Whether it is the branch of the sweep."""
+        """Whether the branch was found by the sweep."""
         return self.origin == "sweep"
 
 
@@ -91,7 +91,7 @@ class FoundMotions:
 
     @property
     def isolas(self) -> int:
-        """Number of branches that no sweep meets and that close in themselves."""
+        """Number of isolas: closed branches that no sweep meets."""
         return sum(branch.isola for branch in self.branches)
 
     @property

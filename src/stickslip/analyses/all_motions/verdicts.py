@@ -16,9 +16,9 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
 from stickslip.units import millimetres
 
-HIGHER = 1.001  # times the swept peak, from where a branch is said to reach higher
-CHANGED = ALIKE  # relative change by more harmonics from which it is said: starts in time are told apart by as much
-NAMED = 5  # frequencies
+HIGHER = 1.001  # least ratio of the peak of a higher branch to the peak of the sweep
+CHANGED = ALIKE  # relative change by more harmonics that gives a doubt; motions in time closer than this are equal
+NAMED = 5  # frequencies that a sentence names
 
 
 def case_verdicts(label: str, found: FoundMotions) -> list[Verdict]:
@@ -46,7 +46,7 @@ def case_verdicts(label: str, found: FoundMotions) -> list[Verdict]:
 
 
 def _untried(found: FoundMotions) -> str:
-    """Return at which frequencies the budget left something untried."""
+    """Return the frequencies whose search the budget ended early, as a clause."""
     hertz = [place.hertz for place in found.places if place.spent]
     if not hertz:
         return ""
@@ -55,7 +55,7 @@ def _untried(found: FoundMotions) -> str:
 
 
 def _unfinished(label: str, found: FoundMotions) -> Iterator[Verdict]:
-    """Yield the branches that are not known to their ends, and the frequencies at which no motion is known."""
+    """Doubt branches that are not known to their ends, and frequencies without a known motion."""
     for i, branch in enumerate(found.branches):
         if branch.end not in (CLOSES, LEAVES, WHOLE) and SPENT not in branch.end:
             why = f"branch {i + 1} ({branch.origin}) is not known to its end: {branch.end}"
@@ -67,7 +67,7 @@ def _unfinished(label: str, found: FoundMotions) -> Iterator[Verdict]:
 
 
 def _harmonics(label: str, found: FoundMotions) -> Iterator[Verdict]:
-    """Yield what more harmonics would change in the motions that were found."""
+    """Doubt motions that more harmonics would change, or that have no motion with more harmonics nearby."""
     lost = sum(bool(np.isinf(motion.change)) for _, motion in found.motions)
     off = [(motion.change, place) for place, motion in found.motions if CHANGED < motion.change < np.inf]
     if lost:
@@ -80,7 +80,7 @@ def _harmonics(label: str, found: FoundMotions) -> Iterator[Verdict]:
 
 
 def _higher(label: str, found: FoundMotions) -> Iterator[Verdict]:
-    """Yield the branches that reach higher than the one of the sweep."""
+    """Warn of branches that reach higher than the branch of the sweep."""
     swept = found.swept_peak
     for branch in found.branches:
         if swept > 0.0 and not branch.swept and branch.peak_amplitude > HIGHER * swept:
@@ -92,7 +92,7 @@ def _higher(label: str, found: FoundMotions) -> Iterator[Verdict]:
 
 
 def _basins(label: str, found: FoundMotions, place: SearchedFrequency) -> Iterator[Verdict]:
-    """Yield whether most starts at a frequency end on no motion of the sweep's branch, or on none that repeats."""
+    """Warn of starts at a frequency that end on no periodic motion, and of a most likely motion off the sweep's branch."""
     hertz, starts = place.hertz, place.starts
     if not starts:
         return
@@ -119,7 +119,7 @@ def _basins(label: str, found: FoundMotions, place: SearchedFrequency) -> Iterat
 
 
 def _not_reached(label: str, place: SearchedFrequency) -> Iterator[Verdict]:
-    """Yield the largest stable motion at a frequency where no start ends on it."""
+    """Note the largest stable motion at a frequency if no start ends on it."""
     stable = [m for m in place.motions if m.stability == "stable" and np.isfinite(m.amplitude)]
     top = max(stable, key=lambda motion: motion.amplitude, default=None)
     if top is None or top.count != 0:
@@ -133,7 +133,7 @@ def _not_reached(label: str, place: SearchedFrequency) -> Iterator[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the motions at the frequencies that were searched."""
+    """Return the terminal tables: the motions at the searched frequencies."""
     every = ((record_of(FoundMotions, case), head) for case, head in told_apart(data))
     return tuple(_table(found, head) for found, head in every if found.branches)
 
