@@ -17,12 +17,12 @@ from stickslip.study.analysis import Analysis, Case, of_tables
 
 
 def _lost(found: LimitCycles) -> int:
-    """Return how many amplitudes have no motion."""
+    """Return the number of amplitudes without a motion."""
     return sum(int(np.count_nonzero(np.isfinite(b.amplitude) & ~np.isfinite(b.damping_ratio))) for b in found.branches)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say which modes grow, and whether their stability can be examined."""
+    """Return lines on the growing modes, and on stability if it cannot be examined."""
     question = question_of(case, model)
     lines = []
     for wave in question.waves:

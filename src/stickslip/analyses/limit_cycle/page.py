@@ -35,14 +35,14 @@ class Cycles(Node):
 
 
 def _with_cycles(branch: CycleBranch, motions: FloatArray, at_cycles: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Return the amplitudes of a mode in their order, its limit cycles among them, and a quantity of the motions there.
+    """Return the amplitudes of a mode in rising order, limit cycles included, and a quantity at each of them.
 
     Parameters
     ----------
     branch
         The mode.
     motions
-        (points,) the quantity at the amplitudes that were looked at.
+        (points,) the quantity at the examined amplitudes.
     at_cycles
         The quantity at its limit cycles.
     """
@@ -138,13 +138,13 @@ def _in_time(cycle: Cycle) -> str:
         return NONE
     off = 100 * (cycle.time_amplitude / cycle.amplitude - 1.0)
     told = f"{number(off, 2)} % off"
-    if cycle.stability == "unstable":  # to be near it after so many periods is no confirmation
+    if cycle.stability == "unstable":  # a motion that stays near an unstable cycle for a while confirms nothing
         told += "; unstable, no confirmation"
     return f"{quantity(cycle.time_amplitude, 'm', 5)} ({told})"
 
 
 def _without(found: LimitCycles) -> list[str]:
-    """Say which modes friction cannot bound."""
+    """Name the modes that friction cannot bound."""
     said = [f"{b.name} (at most {number(100 * b.largest_damping_ratio)} %)" for b in found.branches if b.unbounded]
     if not said:
         return []
@@ -177,7 +177,7 @@ def _over_amplitude(found: LimitCycles, own: Sequence[tuple[FloatArray, Sequence
 
 
 def _mark(found: LimitCycles, figure: go.Figure, heights: Sequence[float]) -> None:
-    """Mark limit cycles by what their stability is."""
+    """Mark limit cycles by their stability."""
     factor, unit = figure.layout.meta["factor"], figure.layout.meta["unit"]
     of_branch = [i for i, branch in enumerate(found.branches) for _ in branch.cycles]
     every = [(cycle, i, height) for (_, cycle), i, height in zip(found.cycles, of_branch, heights, strict=True)]

@@ -37,7 +37,7 @@ class Question:
     label
         Label of the case.
     model
-        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes are those of the first output.
+        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes belong to the first output.
     asked
         The table [limit_cycle].
     evaluator
@@ -117,7 +117,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _refuse_modes(asked: LimitCycleTable, modes: Sequence[Sequence[StuckMode]]) -> None:
-    """Refuse numbers of modes that no wave has that is looked at."""
+    """Refuse mode numbers above the number of modes of all examined waves."""
     most = max((mode.number for own in modes for mode in own), default=0)
     wanted = max(asked.modes or [0])
     if wanted > most:

@@ -74,7 +74,7 @@ class CycleBranch:
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
-        """Its attracting cycles."""
+        """The attracting cycles of the mode."""
         return tuple(cycle for cycle in self.cycles if cycle.attracting)
 
     @property
@@ -165,7 +165,7 @@ def _with_time(branch: CycleBranch, note: Mapping[str, Any]) -> CycleBranch:
 
 
 def _motions(branches: Sequence[CycleBranch]) -> FloatArray:
-    """Return (cycles, harmonics + 1, n, 2) the motions of all limit cycles, zero above the harmonics of each."""
+    """Return the motions (cycles, harmonics + 1, n, 2) of all limit cycles, zero above the harmonics of each."""
     every = [cycle.coefficients for branch in branches for cycle in branch.cycles]
     if not every:
         return np.zeros((0, 1, 0, 2))

@@ -28,8 +28,8 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres
 
 NOT_EXAMINED = "not examined"
-BEGINS = 0.5  # of the amplitude at which slip begins: where the curve begins
-ENDS = 300.0  # times that amplitude: where it ends
+BEGINS = 0.5  # first amplitude of the curve over the amplitude at which slip begins
+ENDS = 300.0  # last amplitude, in the same way
 MODEL, LINEAR, COORDINATES = "model", "linear", "coordinates"  # names of notes
 
 
@@ -135,7 +135,7 @@ def _number(value: float | None) -> float:
 
 
 def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
-    """Return the stability of a cycle, or why it is not examined."""
+    """Return the stability of a cycle, or the reason why it is not examined."""
     why = too_long(problem.system, forced=False)
     if why:
         return why
@@ -163,7 +163,7 @@ def _without(wave: int, mode: StuckMode, problem: str) -> CycleBranch:
 
 
 def _linear(modes: dict[int, list[StuckMode]]) -> dict[str, object]:
-    """Return frequencies (Hz) and damping ratios of all modes that were looked at, NaN where a wave has fewer."""
+    """Return frequencies (Hz) and damping ratios of all examined modes; NaN if a wave has fewer."""
     most = max(len(own) for own in modes.values())
     hertz, ratio = np.full((2, len(modes), most), np.nan)
     for i, own in enumerate(modes.values()):

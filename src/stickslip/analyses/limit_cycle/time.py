@@ -25,15 +25,15 @@ from stickslip.study.store.progress import LOG
 from stickslip.units import HZ, millimetres
 
 STEPS = 512
-FEW_STEPS = 256  # where hundreds of periods are followed for what wins
-KICK = 1e-3  # of their own amplitude, by which speeds are disturbed
+FEW_STEPS = 256  # time steps of a period in the competition of waves, which takes hundreds of periods
+KICK = 1e-3  # disturbance of velocities relative to their amplitude
 SETTLED = 1e-7
-GOLDEN = 2.399963  # rad, of which no few multiples are alike
-SHARE = 0.3  # of the attracting cycle of each wave, with which waves begin that compete
+GOLDEN = 2.399963  # golden angle, rad: the disturbances of all coordinates differ
+SHARE = 0.3  # initial amplitude of a competing wave, as a share of its attracting cycle
 
 
 def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
-    """Return amplitude (m) and frequency (rad/s) reached by time integration from a start near each attracting cycle; NaN for the others."""
+    """Return amplitude (m) and frequency (rad/s) in time after a start near each attracting cycle; NaN for other cycles."""
     amplitude, omega = np.full((2, len(branch.cycles)), np.nan)
     said = ""
     for i, cycle in enumerate(branch.cycles):
@@ -54,7 +54,7 @@ def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
 
 
 def _unconfirmed(cycle: Cycle, marched: Marched) -> str:
-    """Say that to stay near an unstable cycle for so many periods does not confirm it."""
+    """Return the remark that time integration near an unstable cycle confirms nothing; empty for other cycles."""
     if cycle.stability != "unstable":
         return ""
     return (
@@ -93,9 +93,10 @@ def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, An
 
 
 def _beginnings(question: Question, branches: Sequence[CycleBranch]) -> list[tuple[ComplexArray, float]]:
-    """Return amplitudes (n,) of all sectors and frequencies, rad/s, with which waves begin: a share of their attracting cycle.
+    """Return initial amplitudes (n,) of all sectors and frequencies, rad/s, of the waves: a share of their attracting cycle.
 
-    Where none was found the mode itself begins, with the amplitude at which it slips; where it never does, with the least of the others.
+    A wave without an attracting cycle begins as its mode, at the amplitude at which it begins to slip. If it never slips,
+    the smallest such amplitude of the other waves is taken.
     """
     slips = [b.slip_amplitude for b in branches if np.isfinite(b.slip_amplitude)]
     found = []
@@ -120,7 +121,7 @@ def in_time(system: System, question: Question) -> tuple[LinearSide, Interface, 
 
     Raises
     ------
-    InputError
+    StickslipError
         If the model is too large.
     """
     side = system.structure
@@ -150,7 +151,7 @@ def _from_cycle(question: Question, branch: CycleBranch, cycle: Cycle) -> Marche
 
 
 def _motion(question: Question, branch: CycleBranch, cycle: Cycle) -> ComplexArray:
-    """Return the (H+1, n) amplitudes of a cycle; of a wheel those of all sectors."""
+    """Return the (H+1, n) amplitudes of a cycle; all sectors of a wheel are included."""
     full = cycle.coefficients[..., 0] + 1j * cycle.coefficients[..., 1]
     if branch.wave_number == NO_WAVE:
         return full
@@ -158,7 +159,7 @@ def _motion(question: Question, branch: CycleBranch, cycle: Cycle) -> ComplexArr
 
 
 def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:
-    """Return a start with speeds that are off by another share for each coordinate."""
+    """Return a start whose velocities are disturbed, differently in each coordinate."""
     size = sum(omega * np.abs(motion) for motion, omega in motions)
     shares = np.cos(GOLDEN * np.arange(start.velocity.size))
     return replace(start, velocity=start.velocity + KICK * shares * size)

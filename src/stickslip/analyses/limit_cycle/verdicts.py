@@ -11,7 +11,7 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, millimetres
 
-IN_TIME_RTOL = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
+IN_TIME_RTOL = 1e-3  # largest relative difference of time integration from a cycle, in amplitude or frequency
 MORE = "Raise limit_cycle.most_harmonics."
 
 
@@ -53,7 +53,7 @@ def _stable_of(found: LimitCycles, wave: int) -> str:
 
 
 def _not_followed(label: str, found: LimitCycles) -> list[Verdict]:
-    """Say that modes grow which were looked at and not asked for."""
+    """Note growing modes that were not followed, because the study names others."""
     ratios, hertz = found.linear_damping_ratio, found.linear_frequency_hz
     assert ratios is not None
     assert hertz is not None
@@ -104,13 +104,13 @@ def _of_cycle(label: str, found: LimitCycles, branch: CycleBranch, cycle: Cycle)
     elif cycle.attracting and cycle.stability != "stable":
         why = f"{what} is stable in its own amplitude; other disturbances are {cycle.stability}: {cycle.reason}"
         verdicts.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))
-    if cycle.stability != "unstable":  # what is left is elsewhere in time
+    if cycle.stability != "unstable":  # a motion in time leaves an unstable cycle
         verdicts += _of_time(label, what, cycle)
     return verdicts
 
 
 def _named_disturbance(branch: CycleBranch, cycle: Cycle) -> str:
-    """Say what grows; of the cycle's own wave it is a motion at another frequency beside it, which modulates it."""
+    """Name the growing disturbance; in the cycle's own wave it has another frequency and modulates the cycle."""
     wave, hertz = cycle.growing_wave, cycle.growing_omega / HZ
     if wave < 0:
         return "another motion"
@@ -120,7 +120,7 @@ def _named_disturbance(branch: CycleBranch, cycle: Cycle) -> str:
 
 
 def _what_tells(found: LimitCycles) -> str:
-    """Return what tells to which motion a machine goes that leaves a limit cycle."""
+    """Name the source that tells to which motion a machine goes after it leaves a limit cycle."""
     if found.outcome:
         return f"from a mixed start of all unstable waves, in time: {found.outcome}"
     if any(cycle.time_amplitude is not None for _, cycle in found.cycles):
@@ -184,5 +184,5 @@ def _tables(found: LimitCycles, head: str) -> list[TextTable]:
 
 
 def grows(cycle: Cycle) -> str:
-    """Return the wave that grows at an unstable cycle, as a text behind that word."""
+    """Return the wave that grows at an unstable cycle, as a text after the word ``unstable``."""
     return f", wave {cycle.growing_wave}" if cycle.growing_wave >= 0 and cycle.stability == "unstable" else ""
