@@ -80,7 +80,7 @@ class Design:
         return next((c for c in cases if c.identity == like.identity), None)
 
     def held_against(self, case: ShownCase, other: "Design") -> ShownCase | None:
-        """Return the case to compare with a case of another design: the only one, the one with its values, or the one with its varied values."""
+        """Return the case to compare with a case of another design: the same case, the only one, or one with the same values."""
         cases = self.response.cases if self.response else ()
         own = self.case(case)
         if self.response is None or own is not None or len(cases) == 1:
@@ -91,7 +91,7 @@ class Design:
         return None if case.label else next(same, None)
 
     def best(self, *, divided: bool) -> ShownCase | None:
-        """Return the case with the smallest peak among those with the best verdict; with `divided` the peak per newton of its load."""
+        """Return the case with the smallest peak among the best verdicts; `divided`: the peak per newton of its load."""
         if self.response is None or self.response.chosen < 0:
             return None
         first, own = self.response.cases[self.response.chosen], self.response
@@ -114,7 +114,7 @@ class MeasuredCurve:
     amplitude
         (n,) in m, or in m/N.
     per_force
-        Whether it is divided by the excitation.
+        Whether amplitudes are divided by the excitation.
     """
 
     name: str

@@ -58,14 +58,14 @@ def over_first(value: float, first: float) -> float:
 
 
 def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
-    """Return the choices of the reader: the best case of each design, then each case of any design; none if each design has one case."""
+    """Return the choices of the reader: best case of each design, then every case; none if each design has one case."""
     every = _every_case([d.response for d in designs if d.response and len(d.response.cases) > 1])
     names = [(_BEST, ()), *((c.label, c.assigned) for c in every)] if every else []
     return tuple(ShownCase(i, name, float("nan"), float("nan"), own, MUTED) for i, (name, own) in enumerate(names))
 
 
 def _every_case(responses: Iterable[Response]) -> list[ShownCase]:
-    """Return the cases of all responses, one that several have once."""
+    """Return the cases of all responses, common ones once."""
     found: dict[frozenset[str], ShownCase] = {}
     for case in (c for response in responses for c in response.cases):
         found.setdefault(case.identity, case)
@@ -80,9 +80,9 @@ def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | No
 
 
 def opening(designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool) -> ShownCase | None:
-    """Return the initial choice: a case common to all designs, preferably the first design's best; else the best case of each.
+    """Return the initial choice: a case common to all designs, preferably the first design's best; else the best of each.
 
-    The best cases of two designs may have different loads, and then do not compare the designs.
+    The best cases of two designs may have different loads, and are then no comparison.
     """
     told = [d for d in designs if d.response is not None]
     common = [c for c in offered[1:] if all(_case(d, c, divided=divided) for d in told)]
@@ -216,7 +216,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
 
 
 def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, divided: bool) -> Plot | None:
-    """Draw by how much the peaks of each later design are larger than those of the first one, one panel a design."""
+    """Draw the relative difference of the peaks of each later design from the first design, one panel a design."""
     rows = [row for row in peak_rows([d for d, _ in told], divided=divided) if np.isfinite(row.off_percent)]
     families = {
         c.label: (name, c.value) for _, r in told for name, f in families_of(r.data, key, r.peaked).items() for c in f
@@ -262,7 +262,7 @@ def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
 
 @dataclass(frozen=True)
 class PeakRow:
-    """The peak of a case of a design, in Hz and SI units, and its difference from the first design; NaN if that lacks the case."""
+    """The peak of a case of a design, in Hz and SI units, and its difference from the first design (NaN if it lacks the case)."""
 
     case: str
     design: str
@@ -396,7 +396,7 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
 
 
 def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
-    """Return the boxes at the head: the best case of each design, and each design at the initial case if all have it."""
+    """Return the numbers at the head: the best case of each design, and the initial case of each if all designs have it."""
     offered = choices(designs)
     shown = opening(designs, offered, divided=divided)
     best = [(d, d.best(divided=divided)) for d in designs]
