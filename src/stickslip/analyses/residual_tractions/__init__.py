@@ -1,1 +1,1 @@
-"""Bounds over residual tractions: table, question, records, dataset and words."""
+"""Bounds over residual tractions: table, problem, records, verdicts."""

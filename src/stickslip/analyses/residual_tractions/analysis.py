@@ -28,12 +28,12 @@ TOPS: tuple[End, End] = ("least", "most")
 
 
 def _lost(found: ResidualTractions) -> int:
-    """Return at how many frequencies no motion was found."""
+    """Return the number of frequencies without a motion."""
     return sum(bool(np.isnan(point.reference_amplitude)) for point in found.points)
 
 
 def _solve(inputs: Question, done: Sequence[TractionRecord], notes: Notes) -> Iterator[TractionRecord]:
-    """Yield the bounds at each frequency, then where each of them is highest."""
+    """Yield the bounds at each frequency, then at the resonance of each bound."""
     told = {
         "output": inputs.model.output_labels[0],
         "excitation_n": inputs.excitation,
@@ -57,7 +57,7 @@ def _solve(inputs: Question, done: Sequence[TractionRecord], notes: Notes) -> It
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say how many springs have a start."""
+    """Return the line on the number of springs with an initial traction, and on the cost."""
     question = question_of(case, model)
     starts = starts_of(question.model.system.interface)
     springs = int(np.count_nonzero(starts.stiffness > 0.0))
@@ -68,7 +68,7 @@ def _check(case: Case, model: Model) -> tuple[str, ...]:
 
 
 def _along(question: Question, done: Sequence[TractionRecord]) -> Iterator[TractionRecord]:
-    """Yield the bounds at the frequencies that are not done."""
+    """Yield the bounds at the missing frequencies."""
     left = question.omegas[len(done) :]
     if not left.size:
         return

@@ -1,4 +1,4 @@
-"""Residual tractions: the band that they leave open over frequency, and of the resonance."""
+"""Residual tractions: bounds of the amplitude over frequency, and of the resonance."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _NAMES = ("own start", "smallest", "largest")
-_EQUAL = 1e-6  # relative difference of bounds that are one
+_EQUAL = 1e-6  # relative difference of equal bounds
 
 
 def has_width(least: FloatArray, most: FloatArray) -> bool:
@@ -31,7 +31,7 @@ class Tractions(Node):
 
     @cached_property
     def found(self) -> ResidualTractions:
-        """What was found."""
+        """The record of the case."""
         known: ResidualTractions = record_of(ResidualTractions, self.data)
         return known
 
@@ -47,7 +47,7 @@ class Tractions(Node):
 
 
 def band(view: Tractions) -> Plot | None:
-    """Show the smallest and the largest amplitude at each frequency."""
+    """Draw the smallest and the largest amplitude at each frequency."""
     points, least, most = view.found.points, view.least, view.most
     if not points:
         return None
@@ -113,7 +113,7 @@ def _caption(view: Tractions) -> str:
 
 
 def _open_resonance(view: Tractions) -> bool:
-    """Whether there are bounds of the resonance, and they differ."""
+    """Whether the resonance has bounds that differ."""
     if not view.found.resonances:
         return False
     _, least, most = (top.amplitude for top in view.found.resonances)
@@ -121,7 +121,7 @@ def _open_resonance(view: Tractions) -> bool:
 
 
 def resonances(view: Tractions) -> Table | None:
-    """Return the bounds of the resonance, and what time integration says of them."""
+    """Return a table of the bounds of the resonance, with their check by time integration."""
     tops, ends = view.found.resonances, (None, *view.found.ends) if view.found.ends else (None,) * 3
     if not tops:
         return None
@@ -141,7 +141,7 @@ def resonances(view: Tractions) -> Table | None:
 
 
 def _in_time(end: ConfirmedEnd | None) -> tuple[str, str, str]:
-    """Return the amplitude that was solved for again, that in time, and what they say of the bound."""
+    """Return the amplitudes solved again and in time, and whether they confirm the bound."""
     if end is None:
         return NONE, NONE, ""
     words = ("left in time", "confirmed") if end.time_status else ("not found again", "confirmed, not in time")

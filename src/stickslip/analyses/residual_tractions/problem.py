@@ -27,8 +27,8 @@ from stickslip.study.analysis import Case
 from stickslip.study.models.cost import above
 from stickslip.units import HZ, RPM
 
-MOTIONS = (20, 100)  # solved at a frequency: where hardly a spring keeps a traction, and where many do
-STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
+MOTIONS = (20, 100)  # motions solved at a frequency: if hardly a spring keeps a traction, and if many do
+STEPS = 0.5  # Newton steps of such a motion over the steps of a point of a response
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Question:
     label
         Label of the case.
     model
-        The assembled model; bounds are those of the first output.
+        The assembled model; the first output is bounded.
     asked
         The table [residual_tractions].
     evaluator
@@ -100,8 +100,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none, or a force of zero, or the estimated cost
-        exceeds the study's limits.
+        If a contact has no springs with an initial traction, no load vibrates or its force is zero, a load drives a
+        harmonic that is not kept, or the estimated cost exceeds the study's limits.
     """
     asked: ResidualTractionsTable = case.settings.residual_tractions
     driven = sorted(set(model.driven.values()))

@@ -1,4 +1,4 @@
-"""Journal records of bounds at a frequency, and what is found of a case."""
+"""Journal records of bounds at a frequency, and the record of a case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,15 +22,15 @@ class TractionRecord:
     Parameters
     ----------
     stage
-        ``point`` of the range; ``least`` and ``most``: where that bound is highest.
+        ``point``: a frequency of the range; ``least`` and ``most``: the resonance of this bound.
     omega
-        rad/s.
+        Frequency, rad/s.
     each
-        The motion from the model's own start, the smallest, the largest.
+        The motion from the model's own start, the smallest motion, the largest motion.
     springs
         Names of the contacts to which the rows of sliders belong.
     solves, failures, branches
-        As of `TractionBounds`.
+        As in `TractionBounds`.
     """
 
     stage: Stage
@@ -87,7 +87,7 @@ class TractionPoint:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TractionResonance:
-    """Where the curve of a bound is highest."""
+    """Resonance of a bound: the largest amplitude of its curve."""
 
     frequency_hz: float = column(
         "Hz", "where the curve of each bound is highest: own start, smallest, largest amplitude", "resonance_hz"
@@ -104,7 +104,7 @@ class TractionResonance:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConfirmedEnd:
-    """The smallest or the largest resonance, found again in other ways."""
+    """The smallest or the largest resonance, solved again and integrated in time."""
 
     resolved_amplitude: float = column("m", "smallest and largest resonance solved again, forces marched over samples")
     time_amplitude: float = column("m", "smallest and largest resonance followed in time from their tractions")
@@ -114,14 +114,14 @@ class ConfirmedEnd:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResidualTractions:
-    """All that is found of a case.
+    """Record of a case.
 
     Attributes
     ----------
     resonances
-        From the model's own start, smallest, largest; empty where no motion was found.
+        Resonance from the model's own start, smallest and largest resonance; empty if no motion was found.
     ends
-        Smallest, largest; empty where they were not followed.
+        Smallest and largest resonance; empty if they were not followed in time.
     """
 
     output: str | None = column("1", "output whose amplitude is bounded", default=None)
@@ -134,19 +134,19 @@ class ResidualTractions:
 
     @property
     def solves(self) -> int:
-        """Motions that were solved for."""
+        """Number of solved motions."""
         return sum(point.solves for point in self.points)
 
 
 def answer(solved: Solved) -> ResidualTractions:
-    """Return what the job of a case has found, from its records and its notes."""
+    """Return the record of a case from the records and notes of its job."""
     model = solved.notes.get("model", {})
     found: dict[str, Any] = {name: model.get(name) for name in ("output", "excitation_n", "harmonics")}
     records: Sequence[TractionRecord] = solved.records
     points = [r.bounds for r in records if r.stage == "point"]
     by_stage = {r.stage: r.bounds for r in records}
     if points:
-        # the resonances belong to the curves, or these would pass below them
+        # resonances are points of the curves, which would otherwise pass below them
         every = {b.omega: b for b in (*points, *(b for stage, b in by_stage.items() if stage != "point"))}
         found["points"] = tuple(_point(every[omega]) for omega in sorted(every))
     if points and {"least", "most"} <= set(by_stage):

@@ -10,14 +10,14 @@ from stickslip.study.store.netcdf import one_case
 from stickslip.study.verdict import Verdict
 from stickslip.units import millimetres
 
-SMALL = 1e-3  # relative width below which residual tractions change nothing that counts
-LARGE = 1e-2  # above which the user is warned
-FEW = 0.05  # relative change by more harmonics above which those kept are too few
+SMALL = 1e-3  # relative width of the bounds, below which residual tractions do not matter
+LARGE = 1e-2  # relative width of the bounds, above which there is a warning
+FEW = 0.05  # relative change by more harmonics, above which there is a doubt
 ENDS = ("smallest", "largest")
 
 
 def case_verdicts(label: str, found: ResidualTractions) -> list[Verdict]:
-    """Return what is to be thought of a case."""
+    """Return the verdicts on a case."""
     if not found.resonances:
         return []
     verdicts = [_of_width(label, found)]
@@ -50,7 +50,7 @@ def _of_width(label: str, found: ResidualTractions) -> Verdict:
 
 
 def _of_harmonics(label: str, bounds: ResidualTractions) -> list[Verdict]:
-    """Doubt resonances that more harmonics are predicted to change; tell of other frequencies."""
+    """Doubt resonances that more harmonics are predicted to change; note such changes at other frequencies."""
     kept, remedy = bounds.harmonics, "Raise residual_tractions.harmonics."
     error = np.array([top.harmonics_error for top in bounds.resonances])
     found = []
@@ -96,7 +96,7 @@ def _of_branches(label: str, bounds: ResidualTractions) -> list[Verdict]:
 
 
 def _widest(bounds: ResidualTractions) -> str:
-    """Say where the bounds are farthest apart; nothing where they are one everywhere."""
+    """State the frequency at which the bounds are farthest apart; empty if they are equal everywhere."""
     least = np.array([point.least_amplitude for point in bounds.points])
     most = np.array([point.most_amplitude for point in bounds.points])
     width = np.nan_to_num(most / least)
@@ -126,7 +126,7 @@ def _of_ends(label: str, bounds: ResidualTractions) -> list[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints."""
+    """Return the terminal tables."""
     if "resonance_amplitude" not in data:
         return ()
     head = ("case", "own start mm", "at Hz", "smallest mm", "at Hz", "largest mm", "at Hz", "in time", "motions")
