@@ -14,7 +14,7 @@ from stickslip.units import HZ
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say which mode answers."""
+    """Return the line on the mode that answers."""
     mode = question_of(case, model).mode
     told = (
         "" if mode is None else f"mode {mode.number}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"

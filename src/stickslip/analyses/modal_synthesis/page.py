@@ -19,7 +19,7 @@ from stickslip.units import HZ
 
 NAME = "modal_synthesis"
 NOTHING = np.zeros(0)
-MAX_NAMED_CURVES = 24  # curves that get a name of their own
+MAX_NAMED_CURVES = 24  # largest number of curves with names
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Synthesised(Node):
 
     @cached_property
     def found(self) -> ModalSynthesis:
-        """What was found."""
+        """The record of the case."""
         known: ModalSynthesis = record_of(ModalSynthesis, self.data)
         return known
 
@@ -43,7 +43,7 @@ class Synthesised(Node):
         return [one for one in self.found.levels if one.shown]
 
     def answered(self, *answers: str) -> list[SynthesisLevel]:
-        """Return the levels with some answers."""
+        """Return the levels with one of some answers, such as ``trusted``."""
         return [one for one in self.found.levels if one.answer in answers]
 
     def tint(self, level: SynthesisLevel) -> str:
@@ -53,7 +53,7 @@ class Synthesised(Node):
 
 
 def responses(view: Synthesised) -> Plot | None:
-    """Show the responses, the nonlinear mode through their peaks, and direct solutions where there are any."""
+    """Draw the responses, the nonlinear mode through their peaks, and direct solutions if there are any."""
     found, shown = view.found, view.shown
     amplitude = np.concatenate([one.amplitude for one in found.levels])
     if not amplitude.size or not shown:
@@ -138,7 +138,7 @@ def _backbone(found: ModalSynthesis) -> tuple[FloatArray, FloatArray]:
 
 
 def _where(amplitude: FloatArray, curve: IntArray, own: BoolArray) -> FloatArray:
-    """Return the amplitudes of some points and the first beyond each run, so that runs meet; gaps elsewhere and between curves."""
+    """Return the amplitudes of some points and of the first point after each run, so that runs meet; NaN elsewhere."""
     next_to = own.copy()
     same = curve[1:] == curve[:-1]
     next_to[1:] |= own[:-1] & same
@@ -151,7 +151,7 @@ def _share(value: float) -> str:
 
 
 def _along(view: Synthesised) -> str:
-    """Say how far the curves are from the direct ones where the mode is alone."""
+    """State the largest difference of the curves from direct solutions where the mode answers alone."""
     known = [(abs(e), one) for one in view.found.levels if (e := one.along_error) is not None and np.isfinite(e)]
     if not known:
         return ""
@@ -164,7 +164,7 @@ def _along(view: Synthesised) -> str:
 
 
 def peaks(view: Synthesised) -> Plot | None:
-    """Show the peak over its level, each place of the backbone being one."""
+    """Draw the peak over the level of the loads; each place on the backbone is the peak of one level."""
     level, amplitude = view.found.resonance_level, view.found.backbone_amplitude
     if level is None or amplitude is None:
         return None
@@ -218,7 +218,7 @@ def peaks(view: Synthesised) -> Plot | None:
 
 
 def passages(view: Synthesised) -> Plot | None:
-    """Show the amplitude while the frequency is swept."""
+    """Draw the amplitude while the frequency is swept."""
     rates = view.found.passage_hz_per_s
     every = [one.passage_amplitude for one in view.found.levels]
     if rates is None or not np.any(np.isfinite(every)):
@@ -243,7 +243,7 @@ def passages(view: Synthesised) -> Plot | None:
 
 
 def table(view: Synthesised) -> Table | None:
-    """Return the levels, their peaks, and why they are trusted or not."""
+    """Return a table of the levels: peak, verdict and reason."""
     if not view.found.levels:
         return None
     head = [
@@ -277,7 +277,7 @@ def _row(one: SynthesisLevel) -> list[str]:
 
 
 def against_direct(view: Synthesised) -> Table | None:
-    """Return the differences from the direct solutions, of the peaks and along the curves."""
+    """Return a table of the differences from direct solutions, at the peaks and along the curves."""
     if not view.found.direct:
         return None
     rows = []
@@ -291,7 +291,7 @@ def against_direct(view: Synthesised) -> Table | None:
 
 
 def passage_peaks(view: Synthesised) -> Table | None:
-    """Return the peak of each passage beside the steady one."""
+    """Return a table of the peak of each passage beside the steady peak."""
     rows = [
         [
             number(one.level),
@@ -309,7 +309,7 @@ def passage_peaks(view: Synthesised) -> Table | None:
 
 
 def _cycles(view: Synthesised) -> list[str]:
-    """Return the amplitudes at which the mode goes on without any load."""
+    """Return the sentence on limit cycles: amplitudes at which the damping of the mode is zero."""
     amplitudes = view.found.cycle_amplitude
     if amplitudes is None:
         return []

@@ -18,7 +18,7 @@ def percent(share: float, *, unit: bool = True) -> str:
 
 
 def _short(value: float) -> str:
-    """Write a number below ten with two digits; what is below a thousandth is zero to a reader."""
+    """Write a number below ten with two digits; below 0.001 as a bound."""
     if abs(value) < 1e-3:
         return "0" if value == 0.0 else "< 0.001"
     digits = max(0, 1 - int(np.floor(np.log10(abs(value)))))

@@ -33,7 +33,7 @@ from stickslip.study.analysis import Case
 from stickslip.units import RPM
 
 NAME = "modal_synthesis"
-MOST_FORCE = 1e60  # N of a level: beyond, the polynomial of the response overflows
+MOST_FORCE = 1e60  # N, above which the polynomial of the response overflows
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Question:
     label
         Label of the case.
     model
-        The assembled model; amplitudes are those of the first output.
+        The assembled model; amplitudes belong to its first output.
     asked
         The table [modal_synthesis].
     evaluator
@@ -93,8 +93,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If no load or one of a higher harmonic drives the model, a contact is rigid, there is no such mode, no contact slips or opens and
-        there are no amplitudes, or the model cannot be assembled.
+        If no load or one of a higher harmonic drives the model, a contact is rigid, the mode does not exist, no contact
+        slips or opens and no amplitudes are given, or the model cannot be assembled.
     """
     asked: ModalSynthesisTable = case.settings.modal_synthesis
     driven = {name: harmonic for name, harmonic in model.driven.items() if harmonic > 0}
@@ -123,7 +123,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _bounded(levels: Sequence[float], load: HarmonicLoad) -> None:
-    """Refuse levels of forces that no number of the response can hold."""
+    """Refuse levels whose forces exceed the range of numbers of the response."""
     force = max(float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values())
     for level in levels:
         if not level * force <= MOST_FORCE:

@@ -1,4 +1,4 @@
-"""Responses of one nonlinear mode: one at each level of the loads, and all of a case."""
+"""Records of responses from one nonlinear mode: one for each level of the loads, and the record of a case."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ NOTHING = (np.nan, np.nan)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SynthesisLevel:
-    """The response at a level of the loads; NaN where there is none to be shown."""
+    """The response at a level of the loads; NaN without a response that can be shown."""
 
     level: float = column("1", "factor on the harmonic loads")
     answer: str = column("1", "trusted, doubtful, refused or beyond")
@@ -101,13 +101,13 @@ class SynthesisLevel:
 
     @property
     def shown(self) -> bool:
-        """Whether it has a response."""
+        """Whether the level has a response."""
         return self.answer in ("trusted", "doubtful")
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The peak of a passage: rate, Hz/s, amplitude, m, frequency, Hz, share of the steady peak, change of the amplitude in a radian."""
+    """The peak of a passage: rate (Hz/s), amplitude (m), frequency (Hz), share of the steady peak, change in a radian."""
 
     rate: float
     peak: float
@@ -118,7 +118,7 @@ class Passage:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalSynthesis:
-    """All that is found of a case."""
+    """Record of a case."""
 
     output: str = column("1", "output whose amplitude is told", default="")
     mode: int | None = column("1", "number of the mode, by frequency with contacts stuck", default=None)
@@ -170,7 +170,7 @@ class ModalSynthesis:
 
 
 def answer(solved: Solved) -> ModalSynthesis:
-    """Return what the job of a case has found, from its levels and its notes."""
+    """Return the record of a case from the levels and notes of its job."""
     notes = solved.notes
     found: dict[str, Any] = {"output": str(notes.get("model", {}).get("output", ""))}
     if "design" in notes:
@@ -200,7 +200,7 @@ def _of_design(note: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _judged(level: SynthesisLevel, *, direct: bool) -> SynthesisLevel:
-    """Return a level with what follows from its curves; without direct solutions nothing of these."""
+    """Return a level with the numbers derived from its curves; without direct solutions, these numbers are None."""
     low, high = _around_peak(level)
     found: dict[str, Any] = {"alone_from": low, "alone_to": high, **_of_passages(level)}
     if direct:
@@ -222,15 +222,16 @@ def _of_passages(level: SynthesisLevel) -> dict[str, FloatArray]:
 
 
 def _around_peak(level: SynthesisLevel) -> tuple[float, float]:
-    """Return the first and last frequency, rad/s, around the peak between which the mode answers alone; NaN where it does not at the peak."""
+    """Return the range of frequencies, rad/s, around the peak in which the mode answers alone; NaN if not even the peak."""
     held = _around(level)
     return (float(level.omega[held].min()), float(level.omega[held].max())) if held.any() else NOTHING
 
 
 def _along_error(level: SynthesisLevel) -> tuple[float, float]:
-    """Return the largest relative difference from the direct solution around the peak where the mode answers alone, and its frequency, rad/s.
+    """Return the largest relative difference from the direct solution, and its frequency, rad/s.
 
-    Each direct point is held against the synthesised motion of its frequency that is nearest.
+    The range around the peak counts in which the mode answers alone. Each direct point is compared with the nearest
+    synthesised motion at its frequency.
     """
     held = _around(level)
     both = held[:-1] & held[1:] & (level.curve[:-1] == level.curve[1:])
@@ -250,7 +251,7 @@ def _along_error(level: SynthesisLevel) -> tuple[float, float]:
 
 
 def _around(level: SynthesisLevel) -> BoolArray:
-    """Return the points next to the peak and along the curve from there, as far as the mode answers alone."""
+    """Return the points along the curve on both sides of the peak, as far as the mode answers alone."""
     held = np.zeros(level.omega.size, dtype=bool)
     if not (level.omega.size and np.isfinite(level.peak)):
         return held

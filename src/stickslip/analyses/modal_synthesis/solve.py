@@ -48,13 +48,14 @@ NOTE = "backbone"
 NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")
 
 
-TRUSTED, DOUBTFUL = 0.02, 0.05  # relative error that other modes may make of the peak
-COARSE = 0.08  # change of the peak by every second point of the backbone: four times what all points leave
-HARMONICS = 0.2  # higher harmonics over the first, beyond which the first alone is no measure
+TRUSTED, DOUBTFUL = 0.02, 0.05  # largest relative error of the peak by other modes
+COARSE = 0.08  # change of the peak with every second point of the backbone: four times the error with all points
+HARMONICS = 0.2  # higher harmonics over the first, above which the first alone does not measure the motion
 AROUND = 12.0  # half-widths of the widest peak that are shown on either side
-NARROWEST, WIDEST = 0.02, 0.2  # relative, of that
-MOMENTS = 600  # that are kept of a passage
-FAINT = 1e-3  # of the level that the first motion of a mode needs that begins linear: below, responses are in proportion to their level
+NARROWEST, WIDEST = 0.02, 0.2  # limits of this range, relative to the frequency
+MOMENTS = 600  # stored instants of a passage
+# share of the level for the first motion of a mode that begins linear; below, responses are proportional to their level
+FAINT = 1e-3
 NOTHING = np.zeros(0)
 NOBODY = Isolation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, linear=False)
 
@@ -140,7 +141,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     share = level / known
     curve = synthesise(own, known)
     tops = curve.peaks
-    # every curve has one peak, and the first curve is the one that a sweep meets
+    # every curve has one peak; a sweep meets the first curve
     peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]
     alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[0]) if peaks else np.nan
@@ -199,7 +200,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
 
 
 def _in_proportion(own: ModalOscillator, level: float) -> float:
-    """Return a level whose response is in proportion to that of a level where nothing slips, else the level itself."""
+    """Return the level to solve: for a very small one a larger one without slip, to which the response is proportional."""
     faint = FAINT * float(own.needed(np.array([own.begins]))[0])
     if own.begins == 0.0 or level >= faint or len(resonances(own, faint)) > 1:
         return level
@@ -207,7 +208,7 @@ def _in_proportion(own: ModalOscillator, level: float) -> float:
 
 
 def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tuple[float, float]) -> tuple[str, str]:
-    """Say whether a level has an answer, of its peaks the one from small amplitudes, and why."""
+    """Return the verdict on a level and its reason; the peak on the curve from small amplitudes counts."""
     if not curve.place.size:
         return "beyond", "the nonlinear mode begins with more than the level reaches"
     if not curve.peaks or float(curve.place.max()) >= shared.oscillator.ends[1]:
@@ -222,13 +223,13 @@ def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tup
 
 
 def _resolved(shared: Synthesis, found: Resonance) -> float:
-    """Return the relative change of a peak by every second point of the backbone."""
+    """Return the relative change of a peak if every second point of the backbone is left out."""
     other = [r.amplitude for r in resonances(shared.coarser, found.level) if r.top]
     return min((abs(a / found.amplitude - 1.0) for a in other), default=np.inf)
 
 
 def _ends(question: Question, own: ModalOscillator) -> tuple[float, float]:
-    """Return the range of frequencies that is shown, rad/s."""
+    """Return the range of frequencies in the figure, rad/s."""
     given = question.asked.frequency_hz
     if given is not None:
         return given[0] * HZ, given[1] * HZ
@@ -240,7 +241,7 @@ def _ends(question: Question, own: ModalOscillator) -> tuple[float, float]:
 
 
 def _direct(shared: Synthesis, level: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies, rad/s, and amplitudes of the output, m, as a forced response finds them."""
+    """Return frequencies, rad/s, and amplitudes of the output, m, of a forced response by harmonic balance."""
     question = shared.question
     known = question.model.load
     load = HarmonicLoad(known.static, {h: level * f for h, f in known.harmonics.items()})
@@ -258,7 +259,7 @@ def _direct(shared: Synthesis, level: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _passages(shared: Synthesis, level: float, *, shown: bool) -> tuple[Any, Any, Any, Any]:
-    """Return what the record holds of all passages at a level."""
+    """Return frequencies, amplitudes, completion and relative change of all passages at a level."""
     rates = shared.question.asked.passage_hz_per_s
     omega, amplitude = np.full((2, len(rates), MOMENTS), np.nan)
     finished, change = np.zeros(len(rates), dtype=np.int64), np.full(len(rates), np.nan)

@@ -23,14 +23,14 @@ REMEDIES = {
 }
 APART = "[all_motions] searches for motions that a sweep does not reach."
 BESIDE = "The direct solutions beside it show the error."
-FAST = 0.05  # relative change in a radian beyond which a passage is doubtful
-WRONG = 0.02  # of the peak, against the direct solution
-ALONG = 0.05  # of the curve where the mode answers alone, against the direct solution
-FEW = 4  # levels that are named each
+FAST = 0.05  # relative change of the amplitude in a radian, above which a passage is doubtful
+WRONG = 0.02  # largest relative error of the peak against the direct solution
+ALONG = 0.05  # the same of the curve where the mode answers alone
+FEW = 4  # largest number of levels that are named one by one
 
 
 def case_verdicts(label: str, case: ModalSynthesis) -> list[Verdict]:
-    """Return what is to be thought of a case."""
+    """Return the verdicts on a case."""
     if not case.levels:
         return []
     found = []
@@ -47,7 +47,7 @@ def case_verdicts(label: str, case: ModalSynthesis) -> list[Verdict]:
 
 
 def _of_answer(label: str, case: ModalSynthesis, answer: str, own: Sequence[SynthesisLevel], remedy: str) -> Verdict:
-    """Return one verdict on all levels with the same answer and remedy: that of the worst of them."""
+    """Return one verdict on all levels with the same answer and remedy, with the reason of the worst level."""
     worst = own[int(np.argmax(np.nan_to_num([level.foreign for level in own], nan=0.0)))]
     span = _levels(own)
     what = {
@@ -66,7 +66,7 @@ def _of_answer(label: str, case: ModalSynthesis, answer: str, own: Sequence[Synt
 
 
 def _of_peaks(own: Sequence[SynthesisLevel]) -> str:
-    """Say that this is the peak, and within which frequencies around it the mode answers alone: the narrowest of some levels."""
+    """State that the verdict concerns the peaks, and the narrowest range around them in which the mode answers alone."""
     around = [level for level in own if np.isfinite(level.alone_from)]
     said = "This is said of the peak" if len(own) == 1 else "This is said of the peaks"
     if not around:
@@ -120,7 +120,7 @@ def _of_passages(label: str, case: ModalSynthesis) -> list[Verdict]:
 
 
 def _levels(among: Sequence[SynthesisLevel]) -> str:
-    """Name levels: each of a few, the number and the range of many."""
+    """Name a few levels one by one; of many, state the number and the range."""
     levels = [one.level for one in among]
     if len(levels) == 1:
         return f"level {levels[0]:g}"
@@ -130,7 +130,7 @@ def _levels(among: Sequence[SynthesisLevel]) -> str:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the levels of each case."""
+    """Return the terminal tables: the levels of each case."""
     found = []
     for one, head in told_apart(data):
         case: ModalSynthesis = record_of(ModalSynthesis, one)
@@ -182,7 +182,7 @@ def _range(level: SynthesisLevel) -> str:
 
 
 def _passages(case: ModalSynthesis, head: str) -> list[TextTable]:
-    """Return the peaks of the passages."""
+    """Return the table of the peaks of passages."""
     rows = [
         (
             f"{level.level:g}",
