@@ -1,1 +1,1 @@
-"""The questions that a study may ask, one folder each, and the page of a result."""
+"""The analyses of a study, one folder each, and the page of a result."""

@@ -42,7 +42,7 @@ def of_answers(
 
 
 def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:
-    """Yield each different case once, with the heading of its tables: the labels of all equal cases; empty if all cases are equal."""
+    """Yield equal cases once, with their labels as heading of the tables; the heading is empty if all cases are equal."""
     groups = alike(data)
     for group in groups:
         labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]

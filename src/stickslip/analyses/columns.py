@@ -14,11 +14,11 @@ from stickslip.column import Column, Rows, columns_of, rows_of
 from stickslip.study.store.netcdf import variable
 
 MISSING: Mapping[type, Any] = {float: np.nan, int: -1, str: "", bool: False}
-FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # where the records of a variable differ in length
+FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # padding of records of different length
 
-# of a column of several values, by the annotation as a whole: what it is made of differs from one NumPy to the next
+# missing entry of an array, by the whole annotation: the parts of an annotation depend on the version of NumPy
 ENTRIES: Mapping[Any, Any] = {FloatArray: np.nan, IntArray: -1, TextArray: "", tuple[str, ...]: "", Sequence[str]: ""}
-CASE = "case"  # the dimension of cases, which a record of one case lacks
+CASE = "case"  # dimension of cases; the record of one case lacks it
 
 
 def variables(record: Any) -> dict[str, xr.Variable]:
@@ -48,7 +48,7 @@ def record_of(
         Variables of the case, or its dataset, in which single numbers and texts may be attributes. Missing values are NaN, −1, an empty
         text, or the default of the field.
     sizes
-        Lengths of dimensions: a missing array has missing values in this shape. None: it is empty.
+        Lengths of dimensions, the shape of a missing array. None: a missing array is empty.
     """
     values = {name: _value(c.name or name, c, kind, name, case, sizes) for name, c in columns_of(kind).items()}
     for name, inner in rows_of(kind).items():
@@ -172,7 +172,7 @@ def _read(found: xr.Variable | xr.DataArray, c: Column) -> Any:
 
 
 def _as(kind: type[Any], name: str, value: Any) -> Any:
-    """Return a stored value as what the field says; an empty text or array is the default of a field that may be None."""
+    """Return a stored value in the type of the field; an empty text or array becomes None if the field allows it."""
     own = _plain_type(kind, name)
     told = own(value) if own in MISSING and np.ndim(value) == 0 else np.asarray(value)
     empty = not told if isinstance(told, str) else np.size(told) == 0

@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.assembly.model import Model
 from stickslip.column import column, columns_of
 
-NOTE = "model"  # of a job, about its model
+NOTE = "model"  # name of the note about the model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

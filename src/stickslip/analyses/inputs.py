@@ -17,7 +17,7 @@ from stickslip.report.content import Table
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
 from stickslip.report.result import Node
 
-# endings of keys, the longer ones first; True: with a prefix such as µ or M
+# endings of keys, longer ones first; True: the unit takes a prefix such as µ or M
 _UNITS = (
     ("n_per_m3", "N/m³", True),
     ("kg_per_m3", "kg/m³", False),
@@ -36,7 +36,7 @@ _UNITS = (
 _BLADE = re.compile(r"\[(\d+)\]$")
 _FEW_NAMES, _MOST_NAMES = 4, 24
 _ENDS = 2  # numbers of a range
-_LONGEST = 12  # entries of a list that are told
+_LONGEST = 12  # entries of a list that are shown
 
 
 def study_of(root: Node) -> Mapping[str, Any]:

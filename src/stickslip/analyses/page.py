@@ -26,12 +26,12 @@ from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.store.netcdf import alike, one_case
 from stickslip.study.verdict import conclusion, not_trusted, of_tree
 
-FORCED = "forced_response"  # whose tractions other analyses bound
-MODES = "modes"  # whose shapes open on a mode that another analysis finds resonant
+FORCED = "forced_response"  # its figures show bounds over residual tractions, if the result has them
+MODES = "modes"  # its shapes open on a mode that another analysis finds resonant
 
 
 def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
-    """Return the sections whose analysis is in the result, with its dataset."""
+    """Yield the sections whose analysis is in the result, each with its dataset."""
     for name, home in ANALYSES.items():
         if name not in tree.children or not home.page:
             continue
@@ -54,7 +54,7 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
 
 
 def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
-    """Return the contents of the parts of a chapter for a view."""
+    """Yield the contents of the parts of a chapter for a view."""
     for part in parts:
         shown = part(view)
         if isinstance(shown, Sequence):
@@ -67,7 +67,7 @@ Viewed = tuple[Section, xr.Dataset, Sequence[Any]]  # a section, its dataset, an
 
 
 def _answer(shown: Sequence[Viewed]) -> Plot | None:
-    """Return the figure at the top of the page, drawn by the first section; None where each of its cases has another one."""
+    """Return the figure at the top of the page, from the first section; None if each case has its own figure."""
     for section, _, (first, *others) in shown[:1]:
         parts = section.answer or tuple(part for block in section.blocks for part in block.parts)
         figures = (own for own in _contents(parts, first) if isinstance(own, Plot))
@@ -76,14 +76,14 @@ def _answer(shown: Sequence[Viewed]) -> Plot | None:
 
 
 def _answering_first(shown: Sequence[Viewed]) -> list[Viewed]:
-    """Return the sections with the one that answers in front: the first that yields to no other."""
+    """Return the sections, with the first one that yields to no other in front."""
     names = {section.name for section, _, _ in shown}
     first = [own for own in shown if not names & set(own[0].yields_to)][:1]
     return [*first, *(own for own in shown if own not in first)]
 
 
 def _cards(section: Section, data: xr.Dataset, views: Sequence[Any]) -> list[Card]:
-    """Return the numbers of a section for the top of the page; where each case has others, the first case, by its name."""
+    """Return the numbers of a section for the top of the page; if cases differ, of the first case, with its name."""
     own = section.cards(views[0])
     case = str(data["case_label"].values[0]) if len(views) > 1 else ""
     return [replace(card, note="; ".join(filter(None, (card.note, case)))) for card in own]

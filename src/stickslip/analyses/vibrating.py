@@ -127,7 +127,7 @@ class KeptMotions:
 
 def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str, Any]:
     """Return the stored part of motions (..., harmonics, n, 2) of all coordinates: retained coordinates and outputs."""
-    if not coefficients.shape[-2]:  # none was found
+    if not coefficients.shape[-2]:  # no motion was found
         return {}
     return {
         "retained_label": known["retained_label"],

@@ -16,14 +16,14 @@ from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
 from stickslip.report.result import Node
 from stickslip.report.tiles import outlines, patches, triangulated
 
-_MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small
+_MANY_EDGES = 4_000  # edges of a panel, above which only sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
 STEEL, BODY, EDGES = "#b9c4d0", "#8d99a6", "#6f7f91"
 _SAID = ("sticks, or stays closed", "slips", "lifts off", "stays open")
 _COLOURS = (*STATE_COLOURS[:3], MUTED)
 _FLAT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}  # colours as in the legend
-_ONE_WAY = 0.8  # length of the mean of the normals of contacts that look one way
-_MOST_NAMES = 15  # of contact points that do not cover each other
+_ONE_WAY = 0.8  # least length of the mean normal of contacts that face one way
+_MOST_NAMES = 15  # names of contact points that do not overlap
 
 
 def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray]:
@@ -92,7 +92,7 @@ def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArr
 
 
 def _contacts(response: Response, position: FloatArray, *, named: bool, keyed: bool = False) -> list[go.Scatter3d]:
-    """Draw the contact points, coloured by the contact of the model that they belong to."""
+    """Draw the contact points, coloured by their contact."""
     names, colours = np.array(response.labels("contact"), dtype=object), group_colours(response)
     place = _places(response)
     mode = "markers+text" if named and len(names) <= _MOST_NAMES else "markers"
@@ -197,7 +197,7 @@ def _sections(response: Response, position: FloatArray) -> go.Scatter3d:
 
 
 def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corners of a box around the contact points."""
+    """Return the corners of a box around the contact points."""
     margin = 0.35 * float(np.ptp(position, axis=0).max())
     return position.min(axis=0) - margin, position.max(axis=0) + margin
 
@@ -216,7 +216,7 @@ def _eye(response: Response) -> dict[str, float] | None:
 
 
 def space(low: FloatArray, high: FloatArray, *, close: bool, seen: dict[str, float] | None = None) -> dict[str, object]:
-    """Axes of a view of the box between two corners; equal lengths on all axes."""
+    """Return the axes of a view of the box between two corners, with equal lengths on all axes."""
     eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
     if close:
         eye, size = seen or {"x": 0.32, "y": -1.5, "z": -0.8}, 1.6 if seen else 1.3
