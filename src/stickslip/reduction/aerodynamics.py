@@ -1,7 +1,7 @@
-"""Aerodynamic influence coefficients of a bladed disk: the force that a blade feels where it and its neighbours vibrate.
+"""Aerodynamic influence coefficients of a bladed disk: forces on a blade from its own vibration and its neighbours'.
 
-Sector n carries the force ``f_n = P Σ_j L_j(ω) Pᴴ u_{n+j}`` on the right-hand side, the columns of P being patterns of force: of a mode
-its shape times the mass matrix, of a point a unit force. In a wave each sector leads the one before it by θ, and the sum is
+Sector n carries the force ``f_n = P Σ_j L_j(ω) Pᴴ u_{n+j}`` on the right-hand side. The columns of P are force patterns: for a
+mode, mass matrix times shape; for a point, a unit force. In a wave each sector leads the previous one by θ, and the sum becomes
 ``G(ω) = Σ_j L_j(ω) e^{ijθ}``.
 """
 
@@ -20,9 +20,9 @@ from stickslip.units import HZ, RPM
 
 Beyond = Literal["refuse", "nearest"]
 LARGEST = 5000  # dofs of a full matrix: 0.4 GB of complex numbers
-EDGE = 1e-9  # of the highest frequency of a table: so far outside is rounding
+EDGE = 1e-9  # excess over the range of a table, relative to its highest frequency, that is rounding
 OUTSIDE = 'Add rows of more frequencies, keep fewer harmonics, or say beyond = "nearest" in [aero].'
-SAME_ANGLE = 1e-6  # rad by which phase angles that come from a file may be off
+SAME_ANGLE = 1e-6  # rad: tolerance of phase angles in files
 
 
 def _none() -> FloatArray:
@@ -38,14 +38,14 @@ class InfluenceCoefficients:
     distances
         (d,) different whole numbers j: the motion of sector n + j acts on sector n. Coefficients of other distances are zero.
     values
-        (s, f, d, m, m) L_j at each speed and frequency between m patterns: rows are forces, columns motions.
+        (s, f, d, m, m) L_j at each speed, frequency and distance, between m patterns: rows are forces, columns motions.
     frequencies
-        (f,) ascending, rad/s; empty where f is 1 and the coefficients hold at any frequency. Between them real and imaginary part
-        are interpolated by monotone cubics (PCHIP), whose slope is continuous.
+        (f,) ascending, rad/s; empty if f is 1 and the coefficients hold at any frequency. Real and imaginary part are interpolated
+        by monotone cubics (PCHIP), whose slope is continuous.
     speeds
-        (s,) ascending, rad/s; empty where s is 1 and the coefficients hold at any speed. Between them: linear.
+        (s,) ascending, rad/s; empty if s is 1 and the coefficients hold at any speed. Interpolation is linear.
     beyond
-        Frequencies outside of the table: ``refuse``, or take the ``nearest``. Speeds outside are always refused.
+        Treatment of frequencies outside the table: ``refuse`` them, or take the ``nearest``. Speeds outside are always refused.
 
     Raises
     ------
@@ -142,22 +142,22 @@ class InfluenceCoefficients:
         return np.asarray(self._through(here)[..., 0] + 1j * self._through(here)[..., 1])
 
     def slope(self, omega: float) -> ComplexArray:
-        """Return the (d, m, m) derivatives by ω."""
+        """Return the (d, m, m) derivatives with respect to ω."""
         if not self.depends_on_frequency or self._inside(omega) != omega:
             return np.zeros(self.values.shape[2:], dtype=complex)
         parts = self._through(omega, 1)
         return np.asarray(parts[..., 0] + 1j * parts[..., 1])
 
     def of_wave(self, phase_angle: float, omega: float) -> ComplexArray:
-        """Return the (m, m) ``G = Σ_j L_j e^{ijθ}`` of an inter-blade phase angle θ in rad."""
+        """Return the (m, m) ``G = Σ_j L_j e^{ijθ}`` for an inter-blade phase angle θ in rad."""
         return _summed(self.at(omega), self._phases(phase_angle))
 
     def slope_of_wave(self, phase_angle: float, omega: float) -> ComplexArray:
-        """Return the (m, m) derivative of `of_wave` by ω."""
+        """Return the (m, m) derivative of `of_wave` with respect to ω."""
         return _summed(self.slope(omega), self._phases(phase_angle))
 
     def frozen(self, phase_angle: float, reference: float) -> tuple[ComplexArray, ComplexArray]:
-        """Return the (m, m) stiffness and damping to subtract from the wave's: with them the force is exact at ω_r.
+        """Return the (m, m) stiffness and damping of the frozen form, to subtract from the wave's matrices; exact at ω_r.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class InfluenceCoefficients:
         return _summed(L.real, phases), _summed(L.imag / reference, phases)
 
     def force(self, phase_angle: float, omega: complex, reference: float) -> ComplexArray:
-        """Return the (m, m) G of a wave at ω in rad/s, from the table; if that has one frequency, from the frozen form.
+        """Return the (m, m) G of a wave at ω in rad/s, from the table or, if it has one frequency, from the frozen form.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class InfluenceCoefficients:
         return np.asarray(stiff + 1j * omega * damp)
 
     def require(self, low: float, high: float, what: str) -> None:
-        """Refuse a table that does not hold the frequencies from `low` to `high`, rad/s, which `what` needs.
+        """Refuse a table that does not cover the frequencies from `low` to `high`, rad/s, which `what` needs.
 
         Raises
         ------
@@ -214,7 +214,7 @@ class InfluenceCoefficients:
         return np.asarray(self.values[0])
 
     def _inside(self, omega: float) -> float:
-        """Return ω, or the end of the table that is nearest where that is wanted."""
+        """Return ω; outside the table return its nearest end, or refuse (`beyond`)."""
         low, high = (float(f) for f in self.frequencies[[0, -1]])
         held = min(max(omega, low), high)
         if abs(held - omega) <= EDGE * high or self.beyond == "nearest":
@@ -286,7 +286,7 @@ def from_phase_angles(
 
 
 def one_twice(numbers: Sequence[int] | IntArray, sectors: int) -> tuple[int, int] | None:
-    """Return the first two neighbours, or wave numbers, that coincide modulo the sectors; None where all differ."""
+    """Return the first two neighbours, or wave numbers, that coincide modulo the sectors; None if all differ."""
     found: dict[int, int] = {}
     for own in (int(number) for number in numbers):
         if own % sectors in found:
@@ -314,7 +314,7 @@ class Feedback:
     influence
         Coefficients of one speed.
     reference
-        ω_r in rad/s, frequency of the frozen form: matrices that replace the force.
+        ω_r in rad/s, frequency at which the frozen form (added stiffness and damping) equals the force.
     """
 
     patterns: Matrix
@@ -334,22 +334,22 @@ class Feedback:
 
     @property
     def conjugate(self) -> "Feedback":
-        """The force on the wave that travels the other way, whose patterns are the conjugates."""
+        """The force on the wave in the opposite direction, which has the conjugate patterns."""
         return replace(self, patterns=np.conj(self.patterns), phase_angle=-self.phase_angle)
 
     def in_coordinates(self, way: Matrix) -> "Feedback":
-        """Return the force in other coordinates, given the matrix (n, n_new) from these to the present ones."""
+        """Return the force in new coordinates; `way` (n, n_new) maps them to the present ones."""
         return replace(self, patterns=np.asarray(way.conj().T @ self.patterns))
 
     def stiffness(self) -> Matrix:
-        """Return the (n, n) stiffness that the frozen form subtracts, N/m; its forces do no work over a period."""
+        """Return the (n, n) stiffness that the frozen form subtracts, N/m."""
         return self._outer(self.influence.frozen(self.phase_angle, self.reference)[0])
 
     def frozen(self, structure: Structure) -> Structure:
-        """Return the wave with the frozen form of the force in its matrices: exact at ω_r, and real for the wheel as a whole.
+        """Return the wave with the frozen form of the force in its matrices: exact at ω_r, and real for the whole wheel.
 
-        ``K − P Σ_j Re(L_j) e^{ijθ} Pᴴ`` and ``C − P Σ_j Im(L_j)/ω_r e^{ijθ} Pᴴ``: not Hermitian in general; the wave that travels
-        the other way has the conjugates.
+        ``K − P Σ_j Re(L_j) e^{ijθ} Pᴴ`` and ``C − P Σ_j Im(L_j)/ω_r e^{ijθ} Pᴴ`` are in general not Hermitian. The wave in the
+        opposite direction has their conjugates.
         """
         if structure.n > LARGEST:
             raise input_error(
@@ -362,11 +362,17 @@ class Feedback:
         return replace(structure, stiffness=K - self._outer(stiff), damping=C - self._outer(damp))
 
     def force(self, omega: complex) -> ComplexArray:
-        """Return the (m, m) G at ω in rad/s. Coefficients of one frequency give their frozen form, also for complex ω, where a motion grows or decays."""
+        """Return the (m, m) G at ω in rad/s.
+
+        Coefficients of one frequency give the frozen form, also for complex ω (a motion that grows or decays).
+        """
         return self.influence.force(self.phase_angle, omega, self.reference)
 
     def beyond_frozen(self, omega: complex) -> tuple[ComplexArray, ComplexArray]:
-        """Return the (m, m) difference of G at ω from the frozen form, and its derivative by ω; a table takes the real part of ω."""
+        """Return the (m, m) difference between G(ω) and the frozen form, and its derivative with respect to ω.
+
+        A table is evaluated at the real part of ω.
+        """
         stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
         slope = self.influence.slope_of_wave(self.phase_angle, omega.real)
         return self.force(omega) - stiff - 1j * omega * damp, slope - 1j * damp

@@ -9,13 +9,13 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.structure import Dofs, Structure, join_dofs, modal_dofs
 
-BLOCK = 32  # columns solved for at a time: what is dense beside the basis stays a tenth of it
+BLOCK = 32  # columns solved at a time, so that dense arrays beside the basis need at most a tenth of its memory
 ROWS = 8192  # rows of the basis projected at a time, for the same reason
-SYMMETRY = 1e-12  # relative, below which a matrix counts as Hermitian
+SYMMETRY = 1e-12  # relative asymmetry below which a matrix counts as Hermitian
 
 
 def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
-    """Return ``basisᴴ matrix basis``, Hermitian to the last digit where `matrix` is.
+    """Return ``basisᴴ matrix basis``, exactly Hermitian if `matrix` is.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
     Returns
     -------
     numpy.ndarray or scipy.sparse.csr_array
-        Sparse where both are.
+        Sparse if both arguments are.
     """
     if scipy.sparse.issparse(basis):
         product = basis.conj().T @ matrix @ basis
         product = product.tocsr() if scipy.sparse.issparse(product) else np.asarray(product)
-    elif scipy.sparse.issparse(matrix) and not matrix.nnz:  # no damping: a third of the work
+    elif scipy.sparse.issparse(matrix) and not matrix.nnz:  # no damping: saves a third of the work
         return np.zeros((basis.shape[1],) * 2, dtype=np.result_type(matrix.dtype, basis.dtype))
     else:
         product = _dense_product(matrix, basis)
@@ -40,7 +40,7 @@ def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
 
 
 def in_coordinates(structure: Structure, basis: Matrix, dofs: Dofs, sets: Mapping[str, IntArray]) -> Structure:
-    """Return a structure in other coordinates: matrices are projected, and `basis` is the product of both bases.
+    """Return a structure in new coordinates: its matrices are projected, and its `basis` is the product of both bases.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The bodies of a structure, each with its factorisation: constraint modes and normal modes.
+"""Constraint modes and normal modes of the separate bodies of a structure.
 
-Bodies that only kept dofs join are treated one by one: equal blades have equal frequencies, of which a Krylov method
-may miss some.
+Bodies that are coupled only through kept dofs are solved one by one: equal blades have equal frequencies, and a Krylov method
+may miss some of them.
 """
 
 from collections.abc import Sequence
@@ -18,24 +18,24 @@ from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import BLOCK
 
-RIGID_SQUARE = 1e-4  # of the shift: squares of frequencies below are zero but for rounding
-FIRST_GUESS = 16  # modes tried first where a frequency limits them
+RIGID_SQUARE = 1e-4  # square of a frequency over the shift: less is a rigid motion with rounding
+FIRST_GUESS = 16  # modes computed first if a frequency limits them
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One body: dofs that the matrices couple.
+    """A body: dofs that the matrices couple.
 
     Parameters
     ----------
     dofs
         (m,) indices in the structure.
     stiffness, mass
-        (m, m).
+        (m, m) matrices of the body.
     solve
-        Solves with ``stiffness − shift · mass``.
+        Solver with ``stiffness − shift · mass``.
     shift
-        In rad²/s²; zero if the body is supported, slightly negative if it is free to move.
+        Shift in rad²/s²; zero if the body is supported, slightly negative if it is free to move.
     """
 
     dofs: IntArray
@@ -46,7 +46,7 @@ class Body:
 
     @property
     def heavy(self) -> int:
-        """Number of modes of the body: dofs with mass."""
+        """Number of dofs with mass, which bounds the number of modes."""
         return int(np.count_nonzero(self.mass.diagonal()))
 
 
@@ -76,7 +76,7 @@ class BodyModes:
         return BodyModes(self.squares[:count], self.body[:count], self.column[:count], self.shapes)
 
     def of(self, body: int) -> tuple[IntArray, Matrix]:
-        """Return the numbers of the modes in which a body moves, and its shapes."""
+        """Return the indices of the modes in which a body moves, and its shapes."""
         mine = np.flatnonzero(self.body == body)
         return mine, self.shapes[body][:, self.column[mine]]
 
@@ -126,13 +126,13 @@ def _own(structure: Structure, part: IntArray) -> tuple[Matrix, Matrix]:
 
 
 def lowest_of(bodies: Sequence[Body], count: int, say: Say) -> BodyModes:
-    """Return the `count` lowest modes of all bodies, or all there are."""
+    """Return the `count` lowest modes of all bodies, or all modes if there are fewer."""
     found = [_modes(body, min(count, body.heavy), say) for body in bodies]
     return _sorted(found).first(count)
 
 
 def modes_up_to(bodies: Sequence[Body], limit: float, say: Say, most: float = np.inf) -> BodyModes:
-    """Return all modes below `limit` (rad/s); of a body with more than `most` modes, that many or a few more."""
+    """Return all modes below `limit` (rad/s), but for each body not many more than `most`."""
     found = []
     for body in bodies:
         count = min(FIRST_GUESS, body.heavy)

@@ -1,4 +1,4 @@
-"""Reduced structures on disk, under the hash of their inputs."""
+"""Cache of reduced structures on disk; the file name is a hash of the inputs."""
 
 import dataclasses
 import hashlib
@@ -17,7 +17,7 @@ from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.structure import Dofs, Structure
 from stickslip.model.structure_file import load_structure, save_structure
 
-LAYOUT = 1  # raised when the same input no longer gives the same hash
+LAYOUT = 1  # version of the hash, increased when the same input gives another hash
 
 
 def cached(
@@ -34,14 +34,14 @@ def cached(
     *arguments
         Further arguments: numbers, texts, None, arrays, and dataclasses of these such as `ModesBelow`.
     folder
-        Folder of the files; it is made if need be, and may be deleted at any time.
+        Folder of the files; it is created if missing, and may be deleted at any time.
     say
         Called with a sentence when a file is used, written, or unusable.
 
     Returns
     -------
     Structure
-        The same to the last bit, whether computed or read.
+        The structure, bit by bit the same whether computed or read.
 
     Raises
     ------
@@ -50,8 +50,8 @@ def cached(
 
     Notes
     -----
-    The name of a file is the SHA-256 of the function's name, the version of this package and all content. It holds plain
-    arrays, nothing that could be executed. It is put in place when complete; a damaged file is computed again.
+    The name of a file is the SHA-256 of the function's name, the version of this package and all content. The file contains plain
+    arrays and no executable content. It appears under its name only when complete; a damaged file is computed again.
     """
     path = Path(folder) / f"{_key(reduction, structure, arguments)}.npz"
     if path.exists():
@@ -65,7 +65,7 @@ def cached(
     made = reduction(structure, *arguments)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        own = path.with_name(f"{uuid.uuid4().hex}.npz")  # two runs may write at once
+        own = path.with_name(f"{uuid.uuid4().hex}.npz")  # two runs may write at the same time
         save_structure(made, own)
         own.replace(path)
     except (InputError, OSError) as error:
@@ -76,7 +76,7 @@ def cached(
 
 
 def content_hash(*values: object) -> str:
-    """Return the SHA-256 of the version of this package and all content of `values`: numbers, texts, None, arrays, dataclasses of these."""
+    """Return the SHA-256 of this package's version and of `values`: numbers, texts, None, arrays, dataclasses of these."""
     digest = hashlib.sha256(f"{LAYOUT} {stickslip.__version__}".encode())
     for i, value in enumerate(values):
         _add(digest, f"value {i + 1}", value)
@@ -84,7 +84,7 @@ def content_hash(*values: object) -> str:
 
 
 def _key(reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]) -> str:
-    # a method, a partial or a callable object has arguments of its own, which no hash would see
+    # a method, a partial or a callable object has bound arguments, which the hash would miss
     plain = isinstance(reduction, types.FunctionType)
     name = reduction.__qualname__ if plain else repr(reduction)
     if not plain or "<" in name:
@@ -102,7 +102,7 @@ def _key(reduction: Callable[..., Structure], structure: Structure, arguments: t
 
 
 def _add(digest: "hashlib._Hash", name: str, value: object) -> None:
-    """Feed a value to the hash, with its name and kind, so that no two contents read the same."""
+    """Add a value to the hash with its name and type, so that different contents have different hashes."""
     digest.update(f"\n{name}:{type(value).__name__}:".encode())
     parts = _parts(value)
     if parts is not None:

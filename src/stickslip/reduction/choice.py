@@ -27,8 +27,8 @@ class Reduction:
     Parameters
     ----------
     n_modes
-        Modes kept beside the static shapes: a number (a structure with fewer keeps all), `ModesBelow` a frequency, or, with
-        Craig-Bampton, `FrequencyError`.
+        Modes kept in addition to the static shapes: a number (all modes if there are fewer), `ModesBelow` a frequency, or, with
+        Craig-Bampton, a `FrequencyError`.
     method
         ``craig_bampton``: modes with the kept dofs fixed; ``rubin``: modes with them free, rigid motions among them.
 
@@ -62,11 +62,11 @@ class Reduction:
         except SingularError:
             if n_modes != most or self.method != "rubin":
                 raise
-            # all are asked for: as many modes with the kept dofs fixed span the same, whatever has no residual flexibility
+            # all modes are requested, so Craig-Bampton spans the same space, and it needs no residual flexibility
             return craig_bampton(structure, keep, n_modes)
 
     @property
     def in_words(self) -> str:
-        """Method and number of modes, for a line about the part."""
+        """Method and number of modes as text, for a line about the part."""
         modes = f"{self.n_modes} modes" if isinstance(self.n_modes, int) else repr(self.n_modes)
         return f"{self.method}, {modes}"

@@ -1,11 +1,12 @@
-"""Coordinates of a structure in which contacts are simple: gaps themselves, or displacements of a sector and of its neighbours.
+"""Coordinates of a structure for its contacts: the gaps, or displacements of a sector and of its neighbours.
 
 Relative coordinates replace the displacements of both sides by their gaps (Krack et al. 2017, appendix 3).
 
-Nodal coordinates serve travelling waves. Sector n + s does what sector n does, times ``exp(i s θ)``. A dof of a neighbour that a contact touches
-is therefore the own dof in another phase: where contacts act on it in that phase alone, it is taken as the coordinate, a unitary change. A dof on
-which contacts act in several phases gets a coordinate for each, tied to the first by a constraint whose force is an unknown. The gaps are then real
-combinations of the coordinates, the same ones in all waves and so in all harmonics.
+Nodal coordinates serve travelling waves. Sector n + s moves like sector n times ``exp(i s θ)``, so a neighbour's dof is the
+sector's own dof in another phase. If contacts act on a dof in one phase only, the dof in this phase becomes the coordinate (a
+unitary change). A dof on which contacts act in several phases gets a coordinate for each; a constraint, whose force is an
+unknown, ties it to the first. The gaps are then real combinations of the coordinates, the same in all waves and so in all
+harmonics.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from stickslip.reduction.cyclic import CyclicSector
 
 @dataclass(frozen=True, eq=False)
 class NodalCoordinates:
-    """Nodal coordinates of travelling waves, in which gaps are real combinations; `nodal_coordinates` makes them.
+    """Nodal coordinates of travelling waves, with real gap operators; `nodal_coordinates` makes them.
 
     The new coordinates are, in order: the old ones, in the first phase in which contacts act on them; copies in other phases; the
     constraint forces of the copies.
@@ -47,7 +48,7 @@ class NodalCoordinates:
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are forces of constraints."""
+        """Indices of the coordinates that are constraint forces."""
         first = self.ahead.size + self.copied.size
         return np.arange(first, first + self.copied.size)
 
@@ -74,7 +75,7 @@ class NodalCoordinates:
         return Structure(turned.mass, turned.damping, stiffness, dofs, turned.sets, turned.basis, turned.loss)
 
     def _constraints(self, diagonal: Matrix, phase: complex | float) -> Matrix:
-        """Return the stiffness of ``copy = phase^s coordinate`` and of its force, in the scale of the coordinate's own stiffness."""
+        """Return the rows and columns of the constraints ``copy = phase^s coordinate``, scaled by the coordinate's stiffness."""
         size = np.abs(diagonal)
         scale = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)[self.copied]
         copies = self.ahead.size + np.arange(self.copied.size)
@@ -87,7 +88,7 @@ class NodalCoordinates:
         return scipy.sparse.csr_array(half + half.conj().T)
 
     def _dofs(self, dofs: Dofs) -> Dofs:
-        """Name copies after the neighbours whose motion they are."""
+        """Return the table of dofs; copies have the name of the neighbour whose motion they describe."""
         copies = dofs.take(self.copied)
         parts = tuple(
             "next." * int(s) + p if p else "next." * int(s - 1) + "next"
@@ -135,7 +136,7 @@ def nodal_coordinates(
     high = np.zeros(sector.structure.n)
     high[sector.high] = 1.0
     tied, free = (scipy.sparse.diags_array(d) @ tie for d in (high, 1.0 - high))
-    # what a contact knows of a coordinate as it is, one sector and two sectors ahead
+    # dependence of the gaps on a coordinate in its own phase, one sector and two sectors ahead
     known = [own @ free, own @ tied + following @ free, following @ tied]
     phases = np.array([(abs(part) > 0).sum(axis=0) > 0 for part in known]).reshape(3, -1)
     first = np.argmax(phases, axis=0)
@@ -163,7 +164,7 @@ def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
     structure
         The wave in `NodalCoordinates`, or in any coordinates without constraints.
     multipliers
-        (c,) coordinates that are constraint forces, the last ones; the c coordinates before them are the copies.
+        (c,) coordinates that are constraint forces, the last ones; the preceding c coordinates are the copies.
     """
     n, ties = structure.n, multipliers.size
     if not np.array_equal(multipliers, np.arange(n - ties, n)):
@@ -175,7 +176,7 @@ def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
     return np.vstack([np.eye(own), copies, np.zeros((ties, own))])
 
 
-RANK = 1e-9  # smallest singular value over largest, below which gaps depend on each other
+RANK = 1e-9  # smallest over largest singular value, below which gaps are dependent
 DIRECTIONS = ("t", "w", "n")
 
 
@@ -184,9 +185,9 @@ def in_relative_coordinates(
 ) -> tuple[Structure, Matrix]:
     """Transform a structure to the gaps of its contacts and to coordinates that do not change the gaps.
 
-    ``u = L [g, rest]`` with ``L = [B⁺ N]``, the pseudo-inverse and the null space of the gap operator, block by block over the groups of
-    contacts that share dofs (eq. 51 and 52; dofs that no contact touches stay as they are). A contact force then acts on its gap
-    alone (eq. 54), so that only the gaps are retained: half as many unknowns between two flexible bodies.
+    ``u = L [g, rest]`` with ``L = [B⁺ N]``, the pseudo-inverse and the null space of the gap operator, computed for each group of
+    contacts that share dofs (eq. 51 and 52; dofs without contact do not change). A contact force then acts on its gap only
+    (eq. 54), so that only the gaps are retained: half as many unknowns between two flexible bodies.
 
     Parameters
     ----------
@@ -201,15 +202,15 @@ def in_relative_coordinates(
     Returns
     -------
     structure
-        The same structure in the coordinates gaps [m], rest [m], untouched dofs. Sets of untouched dofs survive; ``gaps`` holds the gaps
-        in the order of the rows, ``rest`` the coordinates that do not change a gap. `basis` leads back.
+        The same structure in the coordinates gaps [m], rest [m], dofs without contact. Sets of dofs without contact survive; the set
+        ``gaps`` contains the gaps in the order of the rows, ``rest`` the coordinates that do not change a gap. `basis` leads back.
     gap_operator
-        (3 n_contacts, n) in the new coordinates: a single one in each row that had an entry.
+        (3 n_contacts, n) in the new coordinates: a single 1 in each row that had an entry.
 
     Raises
     ------
     InputError
-        If gaps depend on each other; the message names the contacts.
+        If gaps are linearly dependent; the message names the contacts.
     """
     B = _dense(gap_operator)
     if B.ndim != 2 or B.shape[1] != structure.n or B.shape[0] % 3:
@@ -245,7 +246,7 @@ def _dense(matrix: Matrix) -> Matrix:
 
 
 def _local_inverses(B: Matrix, used: IntArray, touched: IntArray, contacts: tuple[str, ...]) -> tuple[Matrix, Matrix]:
-    """Return B⁺ and the null space of B on all dofs, from the blocks of contacts that share dofs."""
+    """Return the pseudo-inverse B⁺ and the null space of B on all dofs, from the blocks of contacts that share dofs."""
     pattern = scipy.sparse.csr_array(B[np.ix_(used, touched)] != 0.0)
     graph = scipy.sparse.block_array([[None, pattern], [pattern.T, None]], format="csr")
     count, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
@@ -269,7 +270,7 @@ def _local_inverses(B: Matrix, used: IntArray, touched: IntArray, contacts: tupl
 
 
 def _tidy(vectors: Matrix) -> Matrix:
-    """Return a basis of the same space with as many zeros as elimination gives, orthonormal: a block has no preferred one."""
+    """Return an orthonormal basis of the same space with many zeros, from elimination."""
     if not vectors.size:
         return vectors
     _, _, order = scipy.linalg.qr(vectors.T, pivoting=True)
@@ -278,7 +279,7 @@ def _tidy(vectors: Matrix) -> Matrix:
 
 
 def _refuse(u: Matrix, s: FloatArray, rows: IntArray, contacts: tuple[str, ...]) -> None:
-    """Name the contacts whose gaps depend on each other."""
+    """Raise the error that names the contacts with dependent gaps."""
     rank = int(np.count_nonzero(s > RANK * s[0]))
     share = np.linalg.norm(u[:, rank:], axis=1)
     involved = sorted({int(r) // 3 for r in rows[share > 1e-6]}, key=lambda c: contacts[c])

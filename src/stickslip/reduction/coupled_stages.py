@@ -1,8 +1,8 @@
-"""Wheels of different numbers of sectors on one shaft, coupled at their flanges by spatial harmonics of the circumference.
+"""Wheels with different numbers of sectors on one shaft, coupled at their flanges by spatial harmonics of the circumference.
 
-D. Laxalde, F. Thouverez and J.-P. Lombard, "Dynamics of multistage bladed disks systems", ASME Turbo Expo 2007, GT2007-27051. Here a flange
-is tied in the mean: of both sides the kept harmonics are equal, and forces of these harmonics
-alone go across, so that what is left out makes the joint softer, never stiffer.
+D. Laxalde, F. Thouverez and J.-P. Lombard, "Dynamics of multistage bladed disks systems", ASME Turbo Expo 2007, GT2007-27051.
+Here a flange is tied weakly: the kept harmonics of both sides are equal, and only forces of these harmonics are transmitted.
+Neglected harmonics therefore make the joint softer, never stiffer.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,16 +23,16 @@ from stickslip.reduction.turning import node_table
 from stickslip.reduction.waves import wave
 from stickslip.units import HZ
 
-DEPENDENT = 1e-10  # of the largest eigenvalue of the constraints' Gram matrix: smaller ones say what others say
-RIGID_SQUARE = 1e-6  # of the shift: squares below are those of rigid motions, but for rounding
+DEPENDENT = 1e-10  # eigenvalue of the constraints' Gram matrix over the largest: smaller ones are redundant constraints
+RIGID_SQUARE = 1e-6  # square of a frequency over the shift: less is a rigid motion with rounding
 
 Wave = tuple[str, int]  # stage and wave number
-CIRCLE_RTOL = 1e-4  # of the flange's size: nodes nearer in radius and height lie on one circle
+CIRCLE_RTOL = 1e-4  # difference in radius or height over the flange's size: with less, nodes lie on one circle
 
 
 @dataclass(frozen=True, eq=False)
 class Circles:
-    """Nodes of a sector's piece of a flange, circle by circle.
+    """Nodes of a sector on a flange, grouped by circles.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class Circles:
     dofs
         (p, 3) dofs x, y, z of each node; -1 for supported components.
     angle
-        (p,) about the axis, rad.
+        (p,) angles about the axis, rad.
     weight
-        (p,) share of each node in its circle's arc within a sector; the shares of a circle add up to one.
+        (p,) quadrature weight of each node: its fraction of the sector's arc of the circle; the weights of a circle add up to one.
     frame
         (p, 3, 3) rows: radial, circumferential and axial unit vector.
     """
@@ -67,7 +67,7 @@ class Circles:
 
     @property
     def fewest(self) -> int:
-        """Fewest nodes that a sector has on a circle."""
+        """Smallest number of nodes of a sector on a circle."""
         return int(np.bincount(self.owner).min())
 
     def reordered(self, order: IntArray) -> "Circles":
@@ -83,9 +83,9 @@ class Flange:
     Parameters
     ----------
     stages
-        Names of the two.
+        Names of the two stages.
     dofs
-        Dofs of both sides: the nodes on each sector's piece of the flange.
+        Dofs of both sides: the nodes of one sector on the flange.
     harmonics
         Spatial harmonics of the circumference that are tied, from 0 on, in both senses of rotation.
     """
@@ -121,8 +121,8 @@ class Multistage:
     def waves(self, nodal_diameter: int) -> tuple[Wave, ...]:
         """Return the waves of all stages that vibrate together in a nodal diameter of the assembly.
 
-        Harmonic m of the circumference is part of wave ``m mod n_s`` of a stage, and a wave has all harmonics ``k + j n_s``: kept
-        harmonics that are aliases on one stage tie different waves of another.
+        Harmonic m of the circumference belongs to wave ``m mod n_s`` of a stage, and a wave contains all harmonics ``k + j n_s``. Kept
+        harmonics that are aliases on one stage therefore couple different waves of another.
         """
         self._require(nodal_diameter)
         found = {
@@ -142,7 +142,7 @@ class Multistage:
 
     @cached_property
     def nodal_diameters(self) -> tuple[int, ...]:
-        """Nodal diameters of the assembly: the lowest kept harmonic of each group that vibrates together."""
+        """Nodal diameters of the assembly: the lowest kept harmonic of each group of coupled waves."""
         seen: set[Wave] = set()
         lowest = []
         for m in self.harmonics:
@@ -154,7 +154,7 @@ class Multistage:
 
     @property
     def unreached(self) -> tuple[Wave, ...]:
-        """Waves, up to half the sectors of their stage, that occur in no nodal diameter of the assembly, as no kept harmonic belongs to them."""
+        """Waves without a kept harmonic, which occur in no nodal diameter of the assembly; wave numbers up to n_s/2."""
         found = {own for m in self.nodal_diameters for own in self.waves(m)}
         found |= {self._wave(name, -k) for name, k in found}
         each = [(name, k) for name, s in self.stages.items() for k in range(s.sectors // 2 + 1)]
@@ -186,12 +186,12 @@ class MultistageModes:
     squares
         (n,) squares of circular frequencies, rad²/s².
     stiffest
-        (n,) the same with all other harmonics of these waves fixed at the flanges: an upper bound for the effect of neglected harmonics;
-        infinite where fewer modes remain.
+        (n,) squares with all other harmonics of these waves fixed at the flanges: an upper bound for the effect of neglected
+        harmonics; infinite if fewer modes remain.
     shapes
         Wave -> (N, n) displacements of sector 0 of the stage in this wave; the whole assembly has unit mass.
     shares
-        (stages, n) share of each stage in the kinetic energy.
+        (stages, n) fraction of the kinetic energy in each stage.
     """
 
     assembly: Multistage
@@ -208,7 +208,7 @@ class MultistageModes:
 
     @property
     def stiffest_hz(self) -> FloatArray:
-        """(n,) `stiffest` in Hz."""
+        """(n,) frequencies of `stiffest` in Hz."""
         return np.asarray(np.sign(self.stiffest) * np.sqrt(np.abs(self.stiffest)) / HZ)
 
     def on_sector(self, stage: str, number: int = 0) -> ComplexArray:
@@ -222,15 +222,14 @@ class MultistageModes:
 
 
 def multistage(stages: Mapping[str, CyclicSector], flanges: Sequence[Flange]) -> Multistage:
-    """Put wheels together at their flanges.
+    """Join wheels at their flanges.
 
     Parameters
     ----------
     stages
         One sector of each wheel by name; all have the same axis.
     flanges
-        Flanges. The nodes of both sides lie on the same circles about the axis; their number on a circle and their angles may
-        differ.
+        Flanges. The nodes of both sides lie on the same circles about the axis; their number and their angles may differ.
 
     Raises
     ------
@@ -297,13 +296,16 @@ def multistage_modes(assembly: Multistage, nodal_diameter: int, n: int, *, say: 
 
 
 def _side_by_side(counts: IntArray, matrices: Sequence[Matrix]) -> Matrix:
-    """Return the matrices of sectors as those of whole wheels, uncoupled."""
+    """Return the block-diagonal matrix of uncoupled wheels from the matrices of their sectors."""
     each = [c * scipy.sparse.csr_array(a) for c, a in zip(counts, matrices, strict=True)]
     return scipy.sparse.block_diag(each, format="csr")
 
 
 def constraints(assembly: Multistage, waves: Sequence[Wave], *, held: bool = False) -> ComplexArray:
-    """Return the (r, N) orthonormal rows that vanish in what the flanges allow the waves; `held`: harmonics that are not kept vanish, too."""
+    """Return the (r, N) orthonormal rows of the flanges' constraints on the waves.
+
+    With `held`, harmonics that are not kept are fixed as well.
+    """
     sizes = [assembly.stages[name].wave_tie(k).shape[1] for name, k in waves]
     ends = np.concatenate([[0], np.cumsum(sizes)])
     place = {own: slice(ends[i], ends[i + 1]) for i, own in enumerate(waves)}
@@ -337,7 +339,7 @@ def _add_harmonic(
     sign: int,
     side: Circles,
 ) -> None:
-    """Add a harmonic of a side of a flange, where its wave is one of those at hand."""
+    """Add a harmonic of one side of a flange to the rows `block`, if its wave is in `place`."""
     name, m = harmonic
     k = m % sector.sectors
     if (name, k) in place:
@@ -355,11 +357,11 @@ class _Problem:
         return factorise(scipy.sparse.csr_array(self.stiffness - self.shift * self.mass))
 
     def free(self, rows: ComplexArray) -> int:
-        """Return an upper bound of the number of motions with mass under constraints."""
+        """Return an upper bound of the number of modes under the constraints `rows`."""
         return int(np.count_nonzero(self.mass.diagonal())) - len(rows)
 
     def modes(self, rows: ComplexArray, n: int, say: Say) -> tuple[FloatArray, ComplexArray]:
-        """Return the lowest modes in what constraints allow, in no order."""
+        """Return the lowest modes under the constraints `rows`, unordered."""
         free, size = self.free(rows), self.mass.shape[0]
         if not 0 < n <= free:
             what = f"{n} modes asked of {free} free motions"
@@ -400,7 +402,9 @@ def _refuse_fine(side: Circles, name: str, sectors: int, harmonics: Sequence[int
 
 
 def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
-    """Return the circles on which the nodes with the dofs `members` lie; a node on the high cut face is left out for its copy on the low one.
+    """Return the circles on which the nodes with the dofs `members` lie.
+
+    A node on the high cut face is left out, since it is a copy of a node on the low face.
 
     Raises
     ------
@@ -466,10 +470,10 @@ def _same_circles(one: Circles, other: Circles, names: tuple[str, str]) -> tuple
 
 
 def projection(side: Circles, harmonic: int) -> Matrix:
-    """Return the (3 c, n) CSR operator from a sector's displacements to a harmonic of the radial, circumferential and axial displacement.
+    """Return the (3 c, n) CSR operator that gives a harmonic of the radial, circumferential and axial displacement of a sector.
 
-    For the wave that contains this harmonic it is ``(1/2π) ∮ u e^{-imφ} dφ`` by the trapezoidal rule; it is the least-squares fit where nodes are evenly
-    spaced.
+    For the wave that contains this harmonic it is ``(1/2π) ∮ u e^{-imφ} dφ`` by the trapezoidal rule; for evenly spaced nodes it is
+    also the least-squares fit.
     """
     factor = side.weight * np.exp(-1j * harmonic * side.angle)
     values = factor[:, None, None] * side.frame
@@ -481,11 +485,11 @@ def projection(side: Circles, harmonic: int) -> Matrix:
 
 
 def _weights(angle: FloatArray, owner: IntArray, pitch: float) -> FloatArray:
-    """Return the share of a sector's arc that each node has of its circle."""
+    """Return the fraction of the sector's arc of its circle that belongs to each node."""
     weight = np.zeros(angle.size)
     for circle in range(int(owner.max()) + 1):
         own = np.flatnonzero(owner == circle)
-        start = np.angle(np.mean(np.exp(1j * angle[own])))  # no cut of the angle inside a sector
+        start = np.angle(np.mean(np.exp(1j * angle[own])))  # keeps the jump of the angle outside the sector
         along = (angle[own] - start + np.pi) % (2 * np.pi)
         order = np.argsort(along)
         sorted_ = along[order]
@@ -496,7 +500,7 @@ def _weights(angle: FloatArray, owner: IntArray, pitch: float) -> FloatArray:
 
 
 def _across(axis: Axis) -> tuple[FloatArray, FloatArray]:
-    """Return two directions across the axis, from which angles count; of parallel axes the same."""
+    """Return two directions perpendicular to the axis, from which angles are counted; they are the same for parallel axes."""
     unit = axis.unit
     first = np.eye(3)[int(np.argmin(np.abs(unit)))]
     first = first - (first @ unit) * unit

@@ -20,7 +20,7 @@ from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
 from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import check_sectors, wave
 
-ROUNDING = 1e-9  # entries of null vectors below are rounding
+ROUNDING = 1e-9  # smaller entries of null vectors are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,10 @@ class CyclicSector:
     """A sector of a wheel and its coupling to the neighbours: ``u_high = e^{iθ} R u_low``.
 
     `cyclic_sector` makes one from geometry. A lumped sector is made directly, with ``axis=None``: its coordinates are
-    scalars that mean the same in every sector. The coordinates `high` are a massless copy of the neighbour's
-    coordinates, for the springs that lead there: for a ring of masses, ``Structure`` of two coordinates, mass
-    ``diag(m, 0)``, a spring between them, ``low=[0]``, ``high=[1]``. A coordinate in both `low` and `high` is shared
-    by all sectors (a hub); give it the mass and stiffness of one sector's share.
+    scalars with the same meaning in every sector. The coordinates `high` are a massless copy of the neighbour's coordinates,
+    for the springs that lead there. Example, a ring of masses: ``Structure`` of two coordinates, mass ``diag(m, 0)``, a spring
+    between them, ``low=[0]``, ``high=[1]``. A coordinate in both `low` and `high` is shared by all sectors (a hub); give it one
+    sector's share of mass and stiffness.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ class CyclicSector:
     sectors
         Number of sectors n_s; sector n lies at angle ``n * pitch`` about the axis.
     low, high
-        (m,) dofs on the faces to the sector before and to the one behind; the i-th dofs of both are partners, and
-        the components of a node are adjacent.
+        (m,) dofs on the faces to the previous and to the next sector; the i-th dofs of both are partners, and the components of a
+        node are adjacent.
     axis
-        Axis of rotation; None for coordinates that no rotation changes.
+        Axis of rotation; None for scalar coordinates, which do not rotate.
     weights
-        (m_high, m_low) where the faces do not match: each dof of `high` follows those of `low` with the weights of its row, which
-        add up to one and are the same for all components of a node; None: partners follow each other.
+        (m_high, m_low) weights for faces with different meshes: each dof of `high` follows the dofs of `low` with the weights of its
+        row, which add up to one and are the same for all components of a node; None: each dof follows its partner.
 
     Raises
     ------
@@ -105,12 +105,12 @@ class CyclicSector:
 
     @property
     def shared(self) -> IntArray:
-        """Dofs that all sectors share: those of nodes on the axis, or of a hub."""
+        """Dofs that all sectors share, on the axis or of a hub."""
         return np.asarray(self.high[~self._tied()[0]])
 
     @property
     def following(self) -> tuple[IntArray, IntArray, Matrix]:
-        """Dependent dofs of the high face, the dofs of the low face on which they depend, and the CSR weights (dependent, independent)."""
+        """Dependent dofs of the high face, dofs of the low face on which they depend, and CSR weights (dependent, independent)."""
         high, low = self._tied()
         weights = (
             scipy.sparse.eye_array(high.sum(), format="csr")
@@ -120,7 +120,7 @@ class CyclicSector:
         return self.high[high], self.low[low], weights
 
     def _tied(self) -> tuple[BoolArray, BoolArray]:
-        """Return which dofs of the high and of the low face are not shared by all sectors."""
+        """Return masks of the dofs of the high and of the low face that are not shared by all sectors."""
         if self.weights is None:
             differ = self.low != self.high
             return differ, differ
@@ -155,7 +155,7 @@ class CyclicSector:
         return scipy.sparse.hstack([tie, self._whirl(phase)], format="csr")
 
     def turn(self, sectors: int) -> Matrix:
-        """Return the (n, n) matrix from displacements in the sector's frame to those `sectors` farther on, in global axes."""
+        """Return the (n, n) matrix that rotates displacements by `sectors` pitches, from the sector's frame to global axes."""
         return self._turn(np.arange(self.structure.n), sectors)
 
     def _turn(self, index: IntArray, sectors: int) -> Matrix:
@@ -165,7 +165,7 @@ class CyclicSector:
         return dof_rotation(self.structure.dofs.take(index), self.axis.rotation(angle), "CyclicSector")
 
     def _whirl(self, phase: complex) -> Matrix:
-        """Return the motions of shared nodes that the turn to the next sector changes by the phase alone."""
+        """Return the motions of shared nodes that a rotation by one pitch only multiplies by the phase of the wave."""
         shared = self.shared
         turn = (phase * self._turn(shared, 1)).toarray() - np.eye(shared.size)
         columns = [np.zeros((self.structure.n, 0))]
@@ -226,7 +226,7 @@ def cyclic_sector(
 
 
 def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
-    """Return the structure of all waves of a wave number (eq. 49), from one sector.
+    """Return the structure of the waves of one wave number (eq. 49), from one sector.
 
     Parameters
     ----------
@@ -238,8 +238,8 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
     Returns
     -------
     Structure
-        Complex, real for standing waves of real sectors, Hermitian where the sector's matrices are; CSR where they are. Its coordinates
-        are those of the sector without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
+        Complex, or real for standing waves of real sectors; Hermitian, and CSR, if the sector's matrices are. Its coordinates are the
+        sector's coordinates without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
         displacements, or to the model that was reduced to the sector.
     """
     tie = sector.wave_tie(wave_number)
@@ -258,10 +258,10 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
 
 
 def _projected(matrix: Matrix, tie: Matrix, free: IntArray, *, evened: bool = True) -> Matrix:
-    """Return ``tieᴴ A tie``, Hermitian to the last digit if `evened` and A is Hermitian to rounding.
+    """Return ``tieᴴ A tie``, exactly Hermitian if `evened` and A is Hermitian to rounding.
 
-    The dofs `free` are the first coordinates; W leads to the others. So it is ``A_ff + A_fo W + Wᴴ A_of + Wᴴ A_oo W``, of which the
-    first, by far the largest, is real where A is.
+    The dofs `free` are the first coordinates, and W gives the other dofs from them. The product is then
+    ``A_ff + A_fo W + Wᴴ A_of + Wᴴ A_oo W``; the first term, by far the largest, is real if A is.
     """
     even = even_part(matrix) if evened else None
     if not scipy.sparse.issparse(matrix):
@@ -281,12 +281,12 @@ def _projected(matrix: Matrix, tie: Matrix, free: IntArray, *, evened: bool = Tr
         resized.resize(size)
         parts.append(resized)
     whole = scipy.sparse.csr_array(parts[0] + ((parts[1] + parts[2]) + parts[3]))
-    whole.sum_duplicates()  # in one order: whoever puts it into order later would change what is stored by its bytes
+    whole.sum_duplicates()  # sorts the indices: sorting later would change the bytes of a matrix that has been hashed
     return whole
 
 
 def _wave_dofs(dofs: Dofs, free: IntArray, whirl: Matrix) -> Dofs:
-    """Return the table of a travelling wave; a coordinate of the axis is named by the component it moves alone."""
+    """Return the dof table of a travelling wave; a coordinate on the axis has the name of the single component it moves."""
     kept = dofs.take(free)
     if not whirl.shape[1]:
         return kept

@@ -11,9 +11,9 @@ from stickslip.model.axis import Axis
 from stickslip.model.structure import Dofs
 from stickslip.reduction.turning import COMPONENTS, node_table
 
-TOLERANCE = 1e-5  # of the faces' size: coordinates in text files have six digits or more
-PARTNERED_NODES_SHARE = 0.8  # share of nodes with partners above which faces are the same, but for some nodes
-LISTED = 6  # unmatched nodes that a message names
+TOLERANCE = 1e-5  # distance of partners over the faces' size: coordinates in text files have six digits or more
+PARTNERED_NODES_SHARE = 0.8  # fraction of nodes with partners, above which the faces match except for some nodes
+LISTED = 6  # largest number of unmatched nodes in a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +27,9 @@ class Face:
     node
         (p,) node numbers.
     position
-        (p, 3) in metres.
+        (p, 3) positions in metres.
     table
-        (p, 6) dofs by component, -1 where a node lacks one.
+        (p, 6) dofs by component; -1 for missing components.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Face:
     table: IntArray
 
     def take(self, index: IntArray) -> "Face":
-        """Return the face with the nodes `index` alone."""
+        """Return the face with only the nodes `index`."""
         return Face(self.name, self.node[index], self.position[index], self.table[index])
 
 
@@ -59,7 +59,7 @@ def face(dofs: Dofs, members: IntArray, name: str) -> Face:
 
 
 def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -> None:
-    """Refuse nodes on the axis that are in neither face: each sector would have a copy of them.
+    """Refuse nodes on the axis that are in neither face, since each sector would have its own copy of them.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float
         raise input_error("cyclic_sector", "nodes of the faces have no position", "Give positions.")
     size = float(np.max(np.ptp(points, axis=0), initial=0.0))
     reach = TOLERANCE * size if tolerance is None else tolerance
-    # a wide tolerance for partners draws no nodes to the axis
+    # a wide tolerance for partners must not move nodes to the axis
     hub, low, high = _split(low, high, axis, TOLERANCE * size if sectors > 1 else -1.0)
     partner, ok = _match(low, high, 2 * math.pi / sectors, axis, reach)
     if not (ok.all() and len(set(partner.tolist())) == len(high.node)):
@@ -145,7 +145,7 @@ def _split(low: Face, high: Face, axis: Axis, reach: float) -> tuple[IntArray, F
 
 
 def _match(low: Face, high: Face, angle: float, axis: Axis, reach: float) -> tuple[IntArray, BoolArray]:
-    """Return the node of `high` nearest to each turned node of `low`, and whether it is near enough."""
+    """Return the node of `high` nearest to each rotated node of `low`, and whether it is near enough."""
     distance, partner = _nearest(axis.turned(low.position, angle), high.position)
     return partner, np.asarray(distance <= reach)
 
@@ -162,7 +162,7 @@ def _nearest(points: FloatArray, among: FloatArray) -> tuple[FloatArray, IntArra
 
 
 def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) -> InputError:
-    """Return the nodes without a partner, or why no node has one."""
+    """Return the error that names nodes without a partner, or explains why no node has one."""
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
     shares = [_share(low, high, sign * 2 * math.pi / sectors, axis, reach) for sign in (1.0, -1.0)]
@@ -195,13 +195,13 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
 
 
 def _share(low: Face, high: Face, angle: float, axis: Axis, reach: float) -> float:
-    """Return the share of the face with fewer nodes that has partners on the other after a turn; sets may hold other free nodes."""
+    """Return the number of nodes with partners after a rotation, over the number of nodes of the smaller face."""
     _, ok = _match(low, high, angle, axis, reach)
     return float(np.count_nonzero(ok)) / max(min(len(low.node), len(high.node)), 1)
 
 
 def _missing(here: Face, there: Face, angle: float, axis: Axis, reach: float) -> str:
-    """List the nodes of one face whose turned position no node of the other has."""
+    """List the nodes of one face whose rotated positions match no node of the other face."""
     distance, nearest = _nearest(axis.turned(here.position, angle), there.position)
     lost = np.flatnonzero(distance > reach)
     if not lost.size:
@@ -223,7 +223,7 @@ def _one_missing(here: Face, there: Face, i: int, distance: float, nearest: int)
 
 
 def _angle_between(low: Face, high: Face, axis: Axis) -> float:
-    """Return the angle about the axis, in rad, from the mean place of one face to that of the other."""
+    """Return the angle about the axis, in rad, between the mean positions of the two faces."""
     if not (len(low.node) and len(high.node)):
         return 0.0
     a, b = (axis.arm(low.position.mean(axis=0)[None])[0], axis.arm(high.position.mean(axis=0)[None])[0])

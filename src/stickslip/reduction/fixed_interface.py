@@ -35,7 +35,7 @@ from stickslip.reduction.truncation import (
     frequencies_below,
 )
 
-AHEAD = 1.5  # modes computed over modes needed, while their number grows: two or three steps use them
+AHEAD = 1.5  # modes computed over modes needed now: the next two or three steps use the surplus
 
 
 def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, say: Say = silent) -> Structure:
@@ -50,7 +50,7 @@ def craig_bampton(structure: Structure, keep: IntArray, n_modes: ModeChoice, *, 
         (k,) indices of the dofs that stay physical: contact, excitation, output. An empty array keeps the lowest
         modes of a supported structure only: modal truncation.
     n_modes
-        Number of fixed-interface modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as this error needs.
+        Number of fixed-interface modes, `ModesBelow` a frequency, or a `FrequencyError` to meet.
     say
         Called with a sentence before each long step.
 
@@ -107,7 +107,7 @@ def _basis(
     static: Matrix | None = None,
     say: Say,
 ) -> Matrix:
-    """Return ``[I 0; Ψ Φ]``, taking the constraint modes from `static` where they are known."""
+    """Return ``[I 0; Ψ Φ]``; `static` holds the constraint modes if they are known."""
     k = keep.size
     kinds = [structure.stiffness.dtype, float, *(shapes.dtype for shapes in modes.shapes)]
     basis = np.zeros((structure.n, k + modes.squares.size), dtype=np.result_type(*kinds))
@@ -122,7 +122,7 @@ def _basis(
 
 
 def _reduced(structure: Structure, keep: IntArray, basis: Matrix, modes: BodyModes) -> Structure:
-    """Return the reduced structure, without the way back."""
+    """Return the reduced structure without its `basis`."""
     k, m = keep.size, modes.squares.size
     stiffness = np.zeros((k + m, k + m), dtype=basis.dtype)
     stiffness[:k, :k] = in_basis(structure.stiffness, basis[:, :k])
@@ -181,15 +181,15 @@ def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeCho
         (c,) dofs to replace: cut faces and joints that stick. Leave out dofs that contact laws need; these stay
         physical, and the response to static forces on them stays exact.
     n_modes
-        Number of characteristic modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as this error needs.
+        Number of characteristic modes, `ModesBelow` a frequency, or a `FrequencyError` to meet.
     say
         Called with a sentence before each long step.
 
     Returns
     -------
     Structure
-        Dense, with the other coordinates in their order, then the characteristic modes [√kg m], which are the set
-        ``interface_modes``. Sets without replaced dofs survive. `basis` leads back to the full model.
+        Dense, with the other coordinates in their order, then the characteristic modes [√kg m], the set ``interface_modes``.
+        Sets without replaced dofs survive. `basis` leads back to the full model.
 
     Raises
     ------
@@ -202,9 +202,9 @@ def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeCho
     Notes
     -----
     A Craig-Bampton reduction of the reduced structure: ``u_c = Ψ u_a + Φ η`` with the other coordinates a kept,
-    ``Ψ = −K_cc⁻¹ K_ca`` and Φ the lowest modes of ``K_cc, M_cc``, matrices into which the interior was condensed
-    statically. Where no nodal coordinate remains, Φ are the characteristic constraint modes of the paper, and rigid
-    motions are among them. `frequency_errors` estimates the loss of accuracy.
+    ``Ψ = −K_cc⁻¹ K_ca`` and Φ the lowest modes of ``K_cc, M_cc``, which contain the statically condensed interior. If no
+    nodal coordinate remains, Φ are the characteristic constraint modes of the paper, including rigid motions.
+    `frequency_errors` estimates the loss of accuracy.
     """
     interface = kept_dofs(PLACE, structure, interface)
     modal = [i for i in interface if structure.dofs.component[i] == "mode"]
@@ -229,7 +229,7 @@ def reduce_interface(structure: Structure, interface: IntArray, n_modes: ModeCho
 
 
 def _interface_bodies(structure: Structure, interface: IntArray, others: IntArray, say: Say) -> list[Body]:
-    """Return the interface with the others fixed; it may be free where nothing static joins it to them."""
+    """Return the bodies of the interface with the other coordinates fixed; without static coupling to these it may be free."""
     if not abs(submatrix(structure.stiffness, interface, others)).max(initial=0.0):
         return loose_bodies(structure, interface, say)
     return bodies_fixed_at(structure, others, f"{PLACE}: with the other dofs fixed", say)

@@ -20,8 +20,8 @@ from stickslip.reduction.basis import BLOCK, in_coordinates, kept_dofs, survivin
 from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 
-DEPENDENT = 1e-8  # smallest eigenvalue of the scaled residual flexibility of the retained dofs
-NAMED = 4  # dofs that a message names
+DEPENDENT = 1e-8  # smallest allowed eigenvalue of the scaled residual flexibility of the kept dofs
+NAMED = 4  # largest number of dofs in a message
 
 
 def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, say: Say = silent) -> Structure:
@@ -34,7 +34,7 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
     keep
         (k,) indices of the dofs that stay physical: contact, excitation, output.
     n_modes
-        Number of free-interface modes, rigid motions among them; or `ModesBelow` a frequency.
+        Number of free-interface modes, including rigid motions, or `ModesBelow` a frequency.
     say
         Called with a sentence before each long step.
 
@@ -49,14 +49,14 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
     InputError
         If `keep` or `n_modes` does not fit the structure, or `n_modes` is smaller than the number of rigid motions.
     SingularError
-        If kept dofs have no residual flexibility of their own; the message names them.
+        If the residual flexibility of the kept dofs is singular; the message names dofs.
 
     Notes
     -----
     ``u = [I 0; Δ Φ_del − Δ Φ_ret] q`` (eq. 58) with the mass-normalised free modes Φ and ``Δ = R_del R_ret⁻¹`` from the
-    residual flexibility ``R = K⁻¹ − Φ ω⁻² Φᴴ`` (eq. 59; the published one divides by ω). It is computed without
-    cancellation as the response to loads without their share in the kept modes, ``R = K⁺ (I − M Φ Φᴴ)``; that exists for free
-    bodies, too (inertia relief). Exact in statics for loads on `keep`; the kept modes are exact, rigid motions among them.
+    residual flexibility ``R = K⁻¹ − Φ ω⁻² Φᴴ`` (eq. 59; the published equation divides by ω). To avoid cancellation it is computed
+    as the response to loads without the part in the kept modes, ``R = K⁺ (I − M Φ Φᴴ)``, which also exists for free bodies
+    (inertia relief). Exact in statics for loads on `keep`; the kept modes, including rigid motions, are exact.
     """
     keep = kept_dofs("rubin", structure, keep)
     most = structure.n - keep.size
@@ -77,7 +77,7 @@ def rubin(structure: Structure, keep: IntArray, n_modes: int | ModesBelow, *, sa
 
 
 def _free_modes(bodies: Sequence[Body], n_modes: int | ModesBelow, say: Say) -> BodyModes:
-    """Return the modes to keep, after checking that all rigid motions are among them."""
+    """Return the kept modes, after checking that they include all rigid motions."""
     if isinstance(n_modes, ModesBelow):
         return modes_up_to(bodies, 2 * math.pi * n_modes.factor * n_modes.up_to_hz, say)
     free = sum(body.shift < 0 for body in bodies)
@@ -95,7 +95,7 @@ def _free_modes(bodies: Sequence[Body], n_modes: int | ModesBelow, say: Say) -> 
 def _residual_flexibility(
     structure: Structure, keep: IntArray, bodies: Sequence[Body], modes: BodyModes, say: Say
 ) -> Matrix:
-    """Return the (n, k) residual flexibility: static displacements under unit forces on `keep` without the part of the modes (eq. 59)."""
+    """Return the (n, k) residual flexibility: static response to unit forces on `keep` minus the response of the modes (eq. 59)."""
     kind = np.result_type(structure.stiffness.dtype, float, *(s.dtype for s in modes.shapes))
     R = np.zeros((structure.n, keep.size), dtype=kind)
     say(f"{keep.size} residual attachment modes")
@@ -116,7 +116,7 @@ def _residual_flexibility(
 
 
 def _static_solve(body: Body, rigid: Matrix, say: Say) -> Solve:
-    """Return the static solver for loads in equilibrium; of a free body as many dofs are held as it has rigid motions."""
+    """Return the static solver for loads in equilibrium; in a free body, as many dofs are fixed as it has rigid motions."""
     if body.shift == 0:
         return body.solve
     order = scipy.linalg.qr(rigid.conj().T, mode="r", pivoting=True)[1]
@@ -132,7 +132,7 @@ def _static_solve(body: Body, rigid: Matrix, say: Say) -> Solve:
 
 
 def _answer(body: Body, solve: Solve, shapes: Matrix, load: Matrix) -> Matrix:
-    """Return the static displacement under the part of `load` that the modes `shapes` do not answer."""
+    """Return the static response to `load` without the response of the modes `shapes`."""
     heavy = body.mass @ shapes
     answer = solve(load - heavy @ (shapes.conj().T @ load))
     return np.asarray(answer - shapes @ (heavy.conj().T @ answer))
@@ -157,7 +157,7 @@ def _basis(
 
 
 def _inverse_at_keep(structure: Structure, keep: IntArray, retained: Matrix) -> Matrix:
-    """Return ``R_ret⁻¹``; refuse where a combination of kept dofs has nothing but the kept modes."""
+    """Return ``R_ret⁻¹``; refuse a matrix that is singular because the kept modes describe a motion of kept dofs completely."""
     diagonal = np.diag(retained).real
     lowest = DEPENDENT * np.max(diagonal, initial=0.0)
     lacking = np.flatnonzero(diagonal <= lowest)

@@ -1,4 +1,4 @@
-"""The whole wheel from one sector: assembled, or as the shape of a travelling wave."""
+"""The whole wheel from one sector: its assembled structure, and shapes of travelling waves on all sectors."""
 
 import numpy as np
 import scipy
@@ -18,20 +18,20 @@ def wheel(sector: CyclicSector) -> Structure:
     Parameters
     ----------
     sector
-        Sector 0; sector n is its copy, turned by n pitches.
+        Sector 0; sector n is its copy, rotated by n pitches.
 
     Returns
     -------
     Structure
-        CSR. Coordinates: sector by sector the dofs without the high face, then the dofs that all sectors share. A set
-        inside a sector becomes a set of the whole wheel, sector by sector, and one of each sector, ``sector3.tip``.
-        `basis` is None: the coordinates are the full field. For a reduced sector it leads to the stacked full models of
-        the sectors, each in the axes of its own sector.
+        CSR. Coordinates: sector by sector the dofs without the high face, then the dofs that all sectors share. A set of the
+        sector becomes a set of the whole wheel, sector by sector, and a set of each sector, such as ``sector3.tip``. `basis` is
+        None, since the coordinates are the full field. For a reduced sector it leads to the stacked full models of the
+        sectors, each in the axes of its own sector.
 
     Raises
     ------
     InputError
-        If a node lacks a component that the rotation mixes with another one.
+        If a node lacks a component that the rotation couples with another one.
     """
     structure, free = sector.structure, sector.independent
     maps = [_from_wheel(sector, n) for n in range(sector.sectors)]
@@ -81,14 +81,14 @@ def wheel_shape(
     structure
         The travelling-wave structure, full or reduced; None for ``travelling_wave(sector, wave_number)``.
     dofs
-        Table of the full model that `structure` expands to; None for that of the sector. Needed where the sector
-        itself is a reduced model.
+        Table of the full model that `structure` expands to; None for the sector's table. Needed if the sector itself is a reduced
+        model.
 
     Returns
     -------
     numpy.ndarray
-        (n_s, n) complex; the displacement at time t is the real part of ``shape * exp(iωt)``. Sectors are not
-        scaled: row 0 is the sector's own displacement (the wave has norm √n_s times that of `to_sectors`).
+        (n_s, n) complex; the displacement at time t is the real part of ``shape * exp(iωt)``. Sectors are not scaled: row 0 is
+        the sector's own displacement, and the norm is √n_s times the norm from `to_sectors`.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def wheel_shape(
 
 
 def _from_wheel(sector: CyclicSector, number: int) -> Matrix:
-    """Return the (n, N) matrix from the wheel's coordinates to those of a sector in its own axes."""
+    """Return the (n, N) matrix from the wheel's coordinates to a sector's displacements in its own axes."""
     structure, free, shared = sector.structure, sector.independent, sector.shared
     size = sector.sectors * free.size + shared.size
     own = np.concatenate([free, shared])

@@ -1,4 +1,4 @@
-"""A mistuned wheel: matrices of all sectors from the waves of the tuned wheel, and low-rank deviations of single sectors.
+"""A mistuned wheel: matrices of all sectors from the tuned wheel's waves, plus low-rank deviations of single sectors.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, appendix 1.
@@ -14,11 +14,11 @@ import scipy
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.model.structure import Dofs, Structure
 
-ROUNDING = 1e-12  # imaginary part over the largest entry: below, what waves make of real sectors is real
+ROUNDING = 1e-12  # imaginary part over the largest entry: less is rounding, and the matrix is real
 
 
 def couplings(waves: Sequence[Matrix]) -> Matrix:
-    """Return the coupling of sector n to sector n - d, for each distance d (eq. 41).
+    """Return the coupling of sector n with sector n - d, for each distance d (eq. 41).
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def couplings(waves: Sequence[Matrix]) -> Matrix:
     Returns
     -------
     numpy.ndarray
-        (n_s, a, b), entry d for the sector d places behind; real where opposite waves are conjugates.
+        (n_s, a, b), entry d for the sector d places behind; real if opposite waves are conjugates.
     """
     dense = np.array([w.toarray() if scipy.sparse.issparse(w) else w for w in waves])
     found = np.fft.ifft(dense, axis=0)
@@ -51,7 +51,7 @@ def strip(blocks: Matrix, sector: int) -> Matrix:
 
 
 def repeated(operators: Sequence[Matrix], sectors: int) -> Matrix:
-    """Return the CSR operator of all sectors from the operators of one sector on itself, on the next one, on the one after it and so on.
+    """Return the CSR operator of all sectors from a sector's operators on itself, on the next sector, on the one after and so on.
 
     Parameters
     ----------
@@ -73,17 +73,20 @@ def repeated(operators: Sequence[Matrix], sectors: int) -> Matrix:
 
 
 def travelling(force: Matrix, phase_angle: float, sectors: int) -> ComplexArray:
-    """Return the load (n_s m,) of a wave on all sectors from the load (m,) on sector 0; each sector leads the one before it by `phase_angle` (rad)."""
+    """Return the load (n_s m,) of a wave on all sectors from the load (m,) on sector 0.
+
+    Each sector leads the previous one by `phase_angle` (rad).
+    """
     return np.asarray(np.outer(np.exp(1j * phase_angle * np.arange(sectors)), force).ravel())
 
 
 def of_alike(blocks: Matrix, gram: Matrix, factors: FloatArray) -> FloatArray:
-    """Return ``Σ_n factors_n T_nᵀ A T_n`` of a matrix A that is the same in all sectors.
+    """Return ``Σ_n factors_n T_nᵀ A T_n`` for a matrix A that is the same in all sectors.
 
     Parameters
     ----------
     blocks
-        (n_s, r, m) couplings that lead from all coordinates to the r rows on which A acts, T_n of sector n.
+        (n_s, r, m) `couplings` of T: T_n gives the r quantities of sector n on which A acts from all coordinates.
     gram
         (r, r) symmetric A, or a function ``rows -> A @ rows``.
     factors
@@ -92,10 +95,10 @@ def of_alike(blocks: Matrix, gram: Matrix, factors: FloatArray) -> FloatArray:
     count, _, m = blocks.shape
     first = strip(blocks, 0)
     product = gram(first) if callable(gram) else gram @ first
-    whole = (first.T @ product).reshape(count, m, count, m)  # of sector 0
+    whole = (first.T @ product).reshape(count, m, count, m)  # contribution of sector 0
     out = np.zeros_like(whole)
     for n in np.flatnonzero(factors):
-        place = (np.arange(count) - n) % count  # what sector 0 sees of sector p - n, sector n sees of p
+        place = (np.arange(count) - n) % count  # sector p acts on sector n as sector p - n acts on sector 0
         out += factors[n] * whole[place][:, :, place]
     return np.asarray(out.reshape(count * m, count * m))
 
@@ -105,7 +108,7 @@ KINDS = ("stiffness", "damping", "mass", "loss")
 
 @dataclass(frozen=True, eq=False)
 class MistunedWheel:
-    """All sectors of a wheel, each with m coordinates of its own (`LinearSide`).
+    """All sectors of a mistuned wheel, each with its own m coordinates (`LinearSide`).
 
     Parameters
     ----------
@@ -114,9 +117,9 @@ class MistunedWheel:
     waves
         Stiffness, damping, mass and structural damping (n_s, m, m) of the waves 0 to n_s - 1 of the tuned wheel.
     shares
-        (n_s, r, m) by wave number: rows that take from a sector's motion the r shares on which the deviations act.
+        (n_s, r, m) by wave number: rows that give, from a sector's motion, the r quantities on which the deviations act.
     factors
-        (n_s, r) deviation of the stiffness on each share from the tuned one, N/m.
+        (n_s, r) deviation of the stiffness for each of these quantities from the tuned wheel, N/m.
     springs
         (n_s m, n_s m) CSR matrix of springs to the ground, N/m, which `structure` has and `waves` lack.
     """
@@ -149,12 +152,12 @@ class MistunedWheel:
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are forces of constraints: none."""
+        """Indices of constraint forces among the coordinates: none."""
         return self.structure.multipliers
 
     @property
     def wheel(self) -> None:
-        """No tuned wheel (see `LinearSide`)."""
+        """None: the wheel is not tuned (see `LinearSide`)."""
         return None
 
     @property
@@ -169,18 +172,18 @@ class MistunedWheel:
 
     @property
     def harmonics(self) -> None:
-        """There are matrices for any harmonic (see `LinearSide`)."""
+        """None: the matrices apply to any harmonic (see `LinearSide`)."""
 
     def at_frequency(self, omega: float) -> "MistunedWheel":
-        """Return itself at every frequency (see `LinearSide`)."""
+        """Return the wheel, which is the same at every frequency (see `LinearSide`)."""
         return self
 
     def of_harmonic(self, harmonic: int) -> Structure:
-        """Return the wheel: it vibrates as itself in every harmonic."""
+        """Return the structure of the wheel, which is the same in every harmonic."""
         return self.structure
 
     def feedback_of(self, harmonic: int) -> None:
-        """Return no aerodynamic force beside that in the matrices."""
+        """Return None: aerodynamic forces are in the matrices."""
 
     def grounded(self, springs: Matrix) -> "MistunedWheel":
         """Return the wheel with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
@@ -189,7 +192,7 @@ class MistunedWheel:
 
     @cached_property
     def active(self) -> tuple[IntArray, IntArray]:
-        """Sector and number of each share that deviates."""
+        """Sector and index of each nonzero deviation."""
         sector, share = np.nonzero(self.factors)
         return sector, share
 

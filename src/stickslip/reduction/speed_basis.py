@@ -1,8 +1,9 @@
-"""Bases for several speeds: one small basis for a travelling wave at all speeds of a range, and modes that change little from speed to speed.
+"""Bases for a range of speeds: one small basis for all speeds, and modal coordinates that change little with the speed.
 
-The stiffness is ``K_0 + Ω² K_1 + Ω⁴ K_2`` and the Coriolis matrix grows with Ω, both exactly. On a basis that holds the modes at three
-speeds they are small dense matrices, exact at these speeds, so that a Campbell diagram costs a few full solutions. Between the speeds the
-error is of second order in what the basis lacks, and is measured at a speed between two of them.
+The stiffness is exactly ``K_0 + Ω² K_1 + Ω⁴ K_2``, and the Coriolis matrix is proportional to Ω. On a basis of the modes at
+three speeds they become small dense matrices. Frequencies are exact at these speeds, so a Campbell diagram costs a few full
+solutions. Between the speeds the error is of second order in the error of the basis; it is measured at one speed between two
+of them.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +20,7 @@ from stickslip.reduction.basis import in_coordinates, surviving_sets, with_modal
 from stickslip.reduction.choice import Reduction
 
 SPARE_MODES = 8  # modes at each speed beyond those followed
-DEPENDENT = 1e-10  # eigenvalues of the Gram matrix below are directions that the basis has already
+DEPENDENT = 1e-10  # relative eigenvalue of the Gram matrix below which a direction is redundant
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +30,11 @@ class SpeedBasis:
     Parameters
     ----------
     speeds
-        (3,) speeds whose modes the basis holds, ascending, rad/s.
+        (3,) speeds whose modes span the basis, ascending, rad/s.
     stiffness
-        (3, r, r) at these speeds.
+        (3, r, r) stiffness at these speeds.
     damping
-        (r, r) at the last of them.
+        (r, r) damping at the last of them.
     error
         Largest relative error of the frequencies at a speed between the first two.
     """
@@ -44,9 +45,9 @@ class SpeedBasis:
     error: float
 
     def at(self, speed: float) -> Structure:
-        """Return the structure at a speed in rad/s, its mass the unit matrix."""
+        """Return the structure at a speed in rad/s; its mass is the unit matrix."""
         x, at = speed**2, self.speeds**2
-        # Lagrange's interpolation in the square of the speed, which has degree two
+        # Lagrange interpolation is exact: the stiffness is of degree two in the square of the speed
         weights = [np.prod([(x - at[j]) / (at[i] - at[j]) for j in range(3) if j != i]) for i in range(3)]
         stiffness = np.einsum("i,ijk->jk", np.array(weights), self.stiffness)
         r = len(stiffness)
@@ -57,12 +58,12 @@ class SpeedBasis:
 def speed_basis(
     structure_at: Callable[[float], Structure], speed_range: tuple[float, float], n_modes: int, *, coriolis: bool
 ) -> SpeedBasis:
-    """Return the small model of a family of structures.
+    """Return the small model of a structure over a range of speeds.
 
     Parameters
     ----------
     structure_at
-        Speed in rad/s -> structure.
+        Function from a speed in rad/s to the structure.
     speed_range
         Lowest and highest speed.
     n_modes
@@ -71,7 +72,7 @@ def speed_basis(
         Whether Coriolis terms in the damping are taken into account.
     """
     low, high = speed_range
-    # in the middle of the squares, on which the stiffness depends
+    # the second speed is in the middle of the squares, on which the stiffness depends
     speeds = np.array([low, np.sqrt((low**2 + high**2) / 2), high])
     family = [structure_at(float(s)) for s in speeds]
     count = min(n_modes + SPARE_MODES, int(np.count_nonzero(family[0].mass.diagonal())))
@@ -96,7 +97,7 @@ def speed_basis(
 
 
 def _orthonormal(vectors: Matrix, mass: Matrix) -> ComplexArray:
-    """Return a basis of the span of `vectors`, with the unit matrix as its mass."""
+    """Return a mass-orthonormal basis of the span of `vectors`."""
     columns = vectors / np.linalg.norm(vectors, axis=0)
     gram = columns.conj().T @ (mass @ columns)
     scale = np.sqrt(np.real(np.diagonal(gram)))
@@ -105,11 +106,11 @@ def _orthonormal(vectors: Matrix, mass: Matrix) -> ComplexArray:
     return np.asarray((columns / scale) @ (directions[:, kept] / np.sqrt(squares[kept])))
 
 
-MIN_COMMON_COSINE = 0.7  # cosine of the angle between what modes of two states span, above which they are the same ones
+MIN_COMMON_COSINE = 0.7  # smallest cosine of the angle between the modal spaces of two states that count as the same
 
 
 class ModesExchangedError(ValueError):
-    """The lowest modes of two states span different spaces: no rotation aligns them."""
+    """Error: the lowest modes of two states span different spaces, so no rotation aligns them."""
 
 
 def modes_of(structure: Structure, keep: IntArray, reduction: Reduction) -> Matrix:
@@ -122,8 +123,8 @@ def on_modes_of_others(
 ) -> Structure:
     """Return a structure reduced to the dofs `keep` and modal coordinates that change smoothly from state to state.
 
-    Modes of neighbouring states, such as two speeds, may differ in sign and order, and change fast where frequencies are
-    close; the space that they span changes little.
+    Modes of neighbouring states, such as two speeds, may differ in sign and order, and change fast if frequencies are close.
+    The space that they span changes little.
 
     Parameters
     ----------
@@ -134,13 +135,14 @@ def on_modes_of_others(
     reduction
         Reduction of the structure.
     others
-        Modes in other states (`modes_of`). One state: the structure's own modes are rotated to be as close to these as possible.
-        Several states: a basis of most of the space that all of them span replaces the own modes; it has 1.5 times as many vectors.
+        Modes in other states (`modes_of`). With one state, the structure's own modes are rotated to be as close to these as
+        possible. With several states, dominant directions of the space that all of them span replace the structure's own modes;
+        there are 1.5 times as many.
 
     Raises
     ------
     ModesExchangedError
-        If there is one other state and the modes span another space.
+        If there is one other state, and its modes span another space.
     """
     small, basis = _basis(structure, keep, reduction)
     static, modes = basis[:, : len(keep)], basis[:, len(keep) :]
@@ -170,11 +172,11 @@ def _in_mass(one: Matrix, mass: Matrix, other: Matrix) -> Matrix:
 
 
 def _spanned(modes: Sequence[Matrix], mass: Matrix) -> Matrix:
-    """Return a basis, of unit mass, of most of what modes of several states span, half as many again as there are of one."""
+    """Return the dominant mass-orthonormal directions of the modes of several states, 1.5 times as many as modes of one state."""
     count = max(m.shape[1] for m in modes)
     basis = np.hstack(list(modes))
     most = min(count + (count + 1) // 2, np.linalg.matrix_rank(basis))
-    for _ in range(2):  # the second time for rounding
+    for _ in range(2):  # the second pass removes rounding errors
         basis = basis / np.sqrt(np.einsum("ij,ij->j", basis.conj(), mass @ basis).real)
         values, vectors = np.linalg.eigh(_in_mass(basis, mass, basis))
         basis = basis @ (vectors[:, -most:] / np.sqrt(values[-most:]))

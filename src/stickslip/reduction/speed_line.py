@@ -1,8 +1,8 @@
 """A structure along an engine-order line: matrices and static load follow the speed.
 
-Matrices of a few speeds on the same coordinates, and polynomials in the square of the speed through them, times the speed for Coriolis
-forces. Those of solids are such polynomials themselves, of second degree, their load of third; what modes of a reduction add converges
-as fast as they change.
+Matrices at a few speeds, on the same coordinates, are interpolated by polynomials in the square of the speed, times the speed for
+Coriolis forces. For solids this is exact: their matrices are such polynomials of second degree, their load of third. For
+modal coordinates of a reduction the interpolation converges as fast as the modes change smoothly with the speed.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,11 +17,14 @@ from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.tuned import TunedWheel
 
 AtRest = Structure | TunedWheel
-REMEMBERED = 8  # speeds whose matrices are kept
+REMEMBERED = 8  # number of speeds whose matrices are cached
 
 
 def speed_nodes(lowest: float, highest: float, intervals: int) -> FloatArray:
-    """Return ascending speeds whose squares are Chebyshev points, ends included; every second one belongs to half as many intervals."""
+    """Return ascending speeds whose squares are Chebyshev points, including the ends.
+
+    Every second one of them belongs to half as many intervals.
+    """
     angles = np.pi * np.arange(intervals + 1) / intervals
     middle, half = (highest**2 + lowest**2) / 2, (highest**2 - lowest**2) / 2
     nodes = np.sqrt(middle - half * np.cos(angles))
@@ -36,13 +39,13 @@ class SpeedLine:
     Parameters
     ----------
     engine_order
-        m, from 1.
+        Engine order m, at least 1.
     speeds
         (k,) speeds from `speed_nodes`, rad/s.
     sides
         Structure or tuned wheel at each speed, all on the same coordinates.
     loads
-        Harmonic -> (k, n) load at each speed, N; 0: the static load.
+        Harmonic -> (k, n) load at each speed, N; harmonic 0 is the static load.
 
     Raises
     ------
@@ -98,7 +101,7 @@ class SpeedLine:
 
     @property
     def multipliers(self) -> IntArray:
-        """Coordinates that are forces of constraints."""
+        """Indices of the coordinates that are constraint forces."""
         return self.top.multipliers
 
     @property
@@ -108,7 +111,7 @@ class SpeedLine:
 
     @property
     def wheel(self) -> None:
-        """No tuned wheel (see `LinearSide`)."""
+        """None: the wheel depends on the frequency (see `LinearSide`)."""
         return None
 
     @property
@@ -118,7 +121,7 @@ class SpeedLine:
 
     @property
     def reduced(self) -> bool:
-        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        """Whether coordinates without contact are condensed (see `LinearSide`)."""
         return True
 
     def at_frequency(self, omega: float) -> AtRest:
@@ -130,7 +133,7 @@ class SpeedLine:
         return self.top.of_harmonic(harmonic)
 
     def feedback_of(self, _harmonic: int) -> None:
-        """Return the aerodynamic force on a harmonic: none."""
+        """Return None: there is no aerodynamic force."""
 
     def grounded(self, springs: Matrix) -> "SpeedLine":
         """Return the line with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
@@ -155,7 +158,7 @@ class SpeedLine:
         return np.asarray(self.weights(speed) @ self.loads[harmonic])
 
     def weights(self, speed: float) -> FloatArray:
-        """Return the (k,) values of the Lagrange polynomials of the speeds at a speed in rad/s."""
+        """Return the (k,) values at a speed in rad/s of the Lagrange polynomials through `speeds`."""
         distance = speed**2 - self.speeds**2
         if np.any(distance == 0.0):
             return np.asarray(distance == 0.0, dtype=float)
@@ -175,7 +178,7 @@ class SpeedLine:
         return replace(top, waves=waves)
 
     def _mixed(self, k: int, structures: list[Structure], weights: FloatArray, ratio: FloatArray) -> Structure:
-        """Return the weighted sum of matrices; the skew part of the damping is proportional to the speed, whose `ratio` to each is given."""
+        """Return the weighted sum of matrices; the skew part of the damping is scaled by the `ratio` of the speeds."""
         if k not in self.stacks:
             self.stacks[k] = _stacked(structures)
         mass, even, skew, stiffness, loss = self.stacks[k]
@@ -192,7 +195,7 @@ class SpeedLine:
 
 
 def _stacked(structures: list[Structure]) -> tuple[Any, ...]:
-    """Return mass, both parts of the damping, stiffness and loss of all speeds, each stacked where it is dense."""
+    """Return mass, even and skew damping, stiffness and loss at all speeds, as one array each if dense."""
     damping = [s.damping for s in structures]
     skew = [(d - d.conj().T) / 2 for d in damping]
     even = [d - g for d, g in zip(damping, skew, strict=True)]

@@ -14,24 +14,24 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, loose_bodies
 
-SEARCH_FACTOR = 2.0  # frequencies that a poor reduction puts so far above the limit are looked at, too
+SEARCH_FACTOR = 2.0  # frequencies up to this multiple of the limit are examined: a poor reduction overestimates them
 
-SEEN = 3  # estimates from which the rate is taken
-FIRST_ORDER = 0.1  # estimates above are a warning, not a number
-DOUBT = 2.0  # a forecast is trusted to that factor
-ROUNDING = 1e-9  # relative, of a frequency at the limit
+SEEN = 3  # number of estimates from which the rate of convergence is determined
+FIRST_ORDER = 0.1  # larger estimates are outside the first-order theory: a warning, not a number
+DOUBT = 2.0  # uncertainty factor of a forecast of the number of modes
+ROUNDING = 1e-9  # relative rounding of a frequency at the limit
 
 
 @dataclass(frozen=True)
 class ModesBelow:
-    """Keep all component modes below ``factor * up_to_hz``.
+    """Rule: keep all component modes below ``factor * up_to_hz``.
 
     Parameters
     ----------
     up_to_hz
         Highest frequency that the reduced model is meant for.
     factor
-        1.5 to 2 by common practice; the higher, the smaller the error.
+        Usually 1.5 to 2; a higher factor gives a smaller error.
 
     Raises
     ------
@@ -48,17 +48,17 @@ class ModesBelow:
 
 @dataclass(frozen=True)
 class FrequencyError:
-    """Keep component modes until the reduced model's frequencies have at most a given estimated error.
+    """Rule: keep component modes until the estimated error of the reduced model's frequencies is small enough.
 
     Parameters
     ----------
     error
-        Relative error of the natural frequencies below `up_to_hz`, as `frequency_errors` estimates it.
+        Allowed relative error of the natural frequencies below `up_to_hz`, as estimated by `frequency_errors`.
     up_to_hz
         Highest frequency that the reduced model is meant for.
     most
-        Largest number of component modes. The reduction ends with an `InputError` if they do not
-        suffice, as soon as the rate at which errors fall shows it.
+        Largest number of component modes. The reduction ends with an `InputError` as soon as the convergence of the errors shows
+        that they do not suffice.
 
     Raises
     ------
@@ -86,11 +86,11 @@ class FrequencyErrors:
     frequencies_hz
         (m,) natural frequencies of the reduced model.
     relative
-        (m,) estimated relative errors, by which the full model's frequency is lower; zero for rigid motions.
+        (m,) estimated relative errors, by which the full model's frequencies are lower; zero for rigid motions.
     missing
-        Number of frequencies of the full model below the limit that the reduced model lacks; frequencies above the first missing
-        one are then numbered wrongly, and their errors refer to the nearest frequency. None if they could not be counted, as with
-        SuperLU's factors of a very large model, see `negative_eigenvalues`.
+        Number of frequencies of the full model below the limit that the reduced model lacks. Frequencies above the first missing
+        one are then numbered wrongly, and their errors refer to the nearest frequency. None if they could not be counted, see
+        `negative_eigenvalues`.
     """
 
     frequencies_hz: FloatArray
@@ -99,7 +99,7 @@ class FrequencyErrors:
 
     @property
     def worst(self) -> float:
-        """Largest relative error; infinite where frequencies are missing."""
+        """Largest relative error; infinite if frequencies are missing."""
         return math.inf if self.missing else float(np.max(self.relative, initial=0.0))
 
 
@@ -122,7 +122,7 @@ def frequency_errors(
     Returns
     -------
     FrequencyErrors
-        Errors of the natural frequencies of `reduced` that may lie below the limit after correction by their error.
+        Errors of those natural frequencies of `reduced` that may lie below the limit after correction by their error.
 
     Raises
     ------
@@ -131,12 +131,12 @@ def frequency_errors(
 
     Notes
     -----
-    A reduced mode ``x``, mass-normalised, with ``λ`` leaves the residual ``r = K x − λ M x``, orthogonal to the reduced
-    space. To first order ``λ`` is too large by ``Σ |φ_dᴴ r|² / (λ_d − λ)`` over the modes left out. Instead of these modes
-    it takes one solution ``y = K⁻¹ r``: ``t0 = rᴴ y`` and ``t1 = λ yᴴ M y`` begin the series in ``λ/λ_d``, of which
-    ``t0 / (1 − t1/t0)`` is the sum where one mode dominates. The exact sum is not smaller (Cauchy-Schwarz); the ratio to
-    the true error tends to one as modes are added. A mode orthogonal to all of the reduced space leaves no residual;
-    therefore the frequencies of the full model below the limit are counted by the signs of the pivots of ``K − λ M``.
+    A mass-normalised reduced mode ``x`` with the eigenvalue ``λ`` has the residual ``r = K x − λ M x``, orthogonal to the reduced
+    space. To first order ``λ`` is too large by ``Σ |φ_dᴴ r|² / (λ_d − λ)`` over the neglected modes. These modes need not be
+    known: with one solution ``y = K⁻¹ r``, ``t0 = rᴴ y`` and ``t1 = λ yᴴ M y`` are the first terms of the series in ``λ/λ_d``.
+    If one mode dominates, its sum is ``t0 / (1 − t1/t0)``. The exact sum is not smaller (Cauchy-Schwarz); the ratio to the true
+    error tends to one as modes are added. A mode orthogonal to the whole reduced space leaves no residual. Therefore the
+    frequencies of the full model below the limit are counted by the signs of the pivots of ``K − λ M``.
     """
     _positive("frequency_errors", up_to_hz=up_to_hz)
     basis = _basis_between(structure, reduced)
@@ -145,7 +145,7 @@ def frequency_errors(
 
 
 def frequencies_below(structure: Structure, limit_hz: float, say: Say) -> int | None:
-    """Return the number of natural frequencies below a limit, rigid motions included; None where it cannot be counted."""
+    """Return the number of natural frequencies below a limit, including rigid motions; None if they cannot be counted."""
     square = (2 * math.pi * limit_hz) ** 2
     return negative_eigenvalues(structure.stiffness - square * structure.mass, say=say)
 
@@ -164,7 +164,7 @@ def errors_of(
     basis
         (n, m) matrix from the coordinates of `reduced` to the dofs of `structure`.
     bodies
-        Bodies of the structure, free, or fixed at dofs whose unit displacements are in the reduced space.
+        Bodies of the structure, free or fixed at dofs whose unit displacements are in the reduced space.
     up_to_hz
         Highest frequency for which errors are estimated, Hz.
     count
@@ -180,10 +180,10 @@ def errors_of(
         r = residual[body.dofs]
         y = body.solve(r)
         first += np.sum((r.conj() * y).real, axis=0)
-        # the series begins at the shift of a free body
+        # for a free body the series is about the shift
         second += (squares - body.shift) * np.sum((y.conj() * (body.mass @ y)).real, axis=0)
     ratio = np.divide(second, first, out=np.zeros_like(first), where=first > 0)
-    too_high = first / np.maximum(1.0 - ratio, 0.5)  # beyond a half the series says little
+    too_high = first / np.maximum(1.0 - ratio, 0.5)  # the two terms are no estimate for ratios above a half
     elastic = squares > 0
     relative = np.zeros(squares.size)
     relative[elastic] = np.maximum(too_high[elastic], 0.0) / (2 * squares[elastic])
@@ -200,7 +200,7 @@ def enough_modes(
 ) -> int:
     """Return the number of modes at which the estimated errors suffice.
 
-    The number grows by 15 to 40 % a step where a few steps suffice, else by 80 %.
+    The number grows by 15 to 40 % in each step if a few steps suffice, else by 80 %.
 
     Parameters
     ----------
@@ -234,7 +234,10 @@ def enough_modes(
 
 
 def _needed(tried: list[tuple[int, float]], error: float) -> float:
-    """Return the number of modes by a power law, the faster one of all estimates and the last two; NaN before it shows."""
+    """Return the number of modes that a power law predicts; NaN with fewer than `SEEN` estimates.
+
+    The faster rate counts, from all estimates or from the last two.
+    """
     known = [(count, worst) for count, worst in tried if worst < FIRST_ORDER]
     if len(known) < SEEN:
         return math.nan
@@ -265,7 +268,7 @@ def _too_many(choice: FrequencyError, count: int, worst: float, needed: float) -
 
 
 def _basis_between(structure: Structure, reduced: Structure) -> Matrix:
-    """Return the map from the coordinates of `reduced` to those of `structure`."""
+    """Return the matrix from the coordinates of `reduced` to the coordinates of `structure`."""
     if reduced.basis is None:
         raise input_error("frequency_errors", "nothing was reduced", "Give the reduced structure.")
     if structure.basis is None:

@@ -1,4 +1,4 @@
-"""A wheel of equal sectors under an engine order: each temporal harmonic is a travelling wave of its own.
+"""A wheel of equal sectors under an engine order: each temporal harmonic is a travelling wave.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
@@ -27,16 +27,16 @@ from stickslip.reduction.whole_wheel import (
 )
 
 Gaps = tuple[Matrix, Matrix | None]
-Write = Callable[[int], tuple[Structure, Matrix]]  # a wave in other coordinates, and its gaps
+Write = Callable[[int], tuple[Structure, Matrix]]  # wave number -> the wave in other coordinates, and its gap operator
 
 
 @dataclass(frozen=True, eq=False)
 class TunedWheel:
     """One sector of a wheel whose sectors all do the same, one after the other; `tuned_wheel` makes one.
 
-    Harmonic h of the vibration has the wave number ``h m mod n_s`` of the engine order m, and it vibrates as the structure of
-    this wave. The first coordinates mean the same in all waves: the gaps of the contacts, or the kept dofs of a sector; a neighbour's dof on
-    which a contact acts is the sector's own dof in another phase. The other coordinates differ from wave to wave.
+    Under engine order m, harmonic h of the vibration is the wave ``h m mod n_s`` and has the structure of this wave. The first
+    coordinates have the same meaning in all waves: the gaps of the contacts, or the kept dofs of a sector; a neighbour's dof with
+    contact is the sector's own dof in another phase. The other coordinates differ from wave to wave.
 
     Parameters
     ----------
@@ -49,8 +49,7 @@ class TunedWheel:
     harmonics
         Highest temporal harmonic for which there is a wave.
     multipliers
-        Coordinates that are constraint forces between a sector and its neighbour, where contacts touch the same dof
-        of both.
+        Coordinates that are constraint forces; there are such if contacts act on a dof in several phases (`NodalCoordinates`).
     feedback
         Wave number -> aerodynamic force on it, in these coordinates; the waves hold its frozen form (`with_aerodynamics`).
     """
@@ -82,15 +81,15 @@ class TunedWheel:
 
     @property
     def reduced(self) -> bool:
-        """Whether coordinates are condensed: those that no contact touches (see `LinearSide`)."""
+        """Whether coordinates without contact are condensed (see `LinearSide`)."""
         return True
 
     def at_frequency(self, omega: float) -> "TunedWheel":
-        """Return itself at every frequency (see `LinearSide`)."""
+        """Return the wheel, which is the same at every frequency (see `LinearSide`)."""
         return self
 
     def of_harmonic(self, harmonic: int) -> Structure:
-        """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as.
+        """Return the structure of the wave of temporal harmonic `harmonic` (0: the mean).
 
         Raises
         ------
@@ -106,11 +105,16 @@ class TunedWheel:
         return self.waves[excited_wave(self.engine_order, self.sectors, harmonic)]
 
     def feedback_of(self, harmonic: int) -> Feedback | None:
-        """Return the aerodynamic force on temporal harmonic `harmonic`, or None. The structure of `of_harmonic` contains its frozen form."""
+        """Return the aerodynamic force on temporal harmonic `harmonic`, or None.
+
+        The structure from `of_harmonic` contains the frozen form of this force.
+        """
         return self.feedback.get(excited_wave(self.engine_order, self.sectors, harmonic))
 
     def with_aerodynamics(self, feedback: Mapping[int, Feedback]) -> "TunedWheel":
-        """Return the wheel with an aerodynamic force on each wave: its frozen form in the matrices, and the force itself for use at known frequencies.
+        """Return the wheel with an aerodynamic force on each wave.
+
+        The matrices contain its frozen form; the force itself is stored for use at known frequencies.
 
         Parameters
         ----------
@@ -132,7 +136,7 @@ class TunedWheel:
 
     @property
     def has_every_wave(self) -> bool:
-        """Whether there is a structure for each wave number, as time integration of all sectors needs."""
+        """Whether every wave number has a structure, which time integration of all sectors needs."""
         return all(k in self.waves for k in range(self.sectors))
 
     def travelling_as(self, wave_number: int) -> "TunedWheel":
@@ -166,12 +170,12 @@ def tuned_wheel(  # noqa: PLR0913
     relative: bool | None = None,
     waves: Sequence[int] = (),
 ) -> tuple[TunedWheel, Matrix]:
-    """Reduce the travelling waves that an engine order excites, to coordinates in which the gap operator is the same for all waves.
+    """Reduce the travelling waves that an engine order excites, to coordinates with the same gap operator for all waves.
 
     Parameters
     ----------
     sector
-        One sector. It may consist of joined parts without cyclic faces: a disk segment with its blade and rigid dampers.
+        One sector. It may contain joined parts without cyclic faces, such as a disk segment with its blade and rigid dampers.
     engine_order
         Engine order m; harmonic h travels with the wave number ``h m mod n_s``.
     harmonics
@@ -183,31 +187,31 @@ def tuned_wheel(  # noqa: PLR0913
         (k,) dofs of the sector that stay physical in the reduction, including those of the contacts and none of the high
         face; None: nothing is reduced.
     n_modes
-        Number of modes of each wave beside the kept dofs.
+        Number of modes of each wave in addition to the kept dofs.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
         dofs `keep` of the wave, as many coordinates in every wave.
     names
         Names of the contacts.
     relative
-        True: the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`). False: the kept dofs in the order of
-        `keep` are (`nodal_coordinates`), for outputs on nodes of contacts and for gaps that depend on each other. None: True where
-        gaps are independent.
+        True: the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`). False: the kept dofs are coordinates,
+        in the order of `keep` (`nodal_coordinates`), for outputs on nodes of contacts and for dependent gaps. None: True if gaps
+        are independent.
     waves
         Further wave numbers to reduce, for stability and for time integration of all sectors.
 
     Returns
     -------
     wheel
-        For `System`, which then solves for one sector alone.
+        For `System`, which then solves for one sector only.
     gap_operator
         (3 n_contacts, n) from its coordinates to the gaps, real.
 
     Raises
     ------
     InputError
-        If operators do not fit, dofs of the contacts are not kept, gaps that are to be coordinates depend on each other in one of
-        the waves, or `reduce` does not return what is described above.
+        If operators do not fit, dofs of the contacts are not kept, gaps that become coordinates are dependent in one of the waves,
+        or `reduce` does not return the structure described above.
     """
     _refuse_misfits(sector, gaps)
     orders = range(harmonics + 1)
@@ -243,7 +247,7 @@ def tuned_wheel(  # noqa: PLR0913
 def _moving(
     sector: CyclicSector, wanted: Sequence[int], place: IntArray | None, n_modes: int, reduce: Reduce
 ) -> dict[int, Structure]:
-    """Return the travelling waves, reduced where dofs are kept; those that are conjugates of others are left out."""
+    """Return the travelling waves; if dofs are kept, they are reduced, and conjugates of other waves are left out."""
     if place is None:
         return {k: travelling_wave(sector, k) for k in wanted}
     moving: dict[int, Structure] = {}
@@ -255,7 +259,7 @@ def _moving(
 
 
 def _refuse_misfits(sector: CyclicSector, gaps: Gaps) -> None:
-    """Refuse a sector that is reduced already, and operators that are not of its dofs."""
+    """Refuse a sector that is already reduced, and operators that do not fit its dofs."""
     refuse_reduced("tuned_wheel", sector)
     n = sector.structure.n
     for operator in gaps:
@@ -274,7 +278,7 @@ def _gaps_of(sector: CyclicSector, wave_number: int, gaps: Gaps) -> Matrix:
 
 
 def _mirrored(sector: CyclicSector, waves: Mapping[int, Structure], k: int) -> bool:
-    """Whether wave k is the conjugate of one that is known."""
+    """Whether wave k is the conjugate of one of `waves`."""
     other = waves.get(sector.sectors - k)
     return other is not None and k > 0 and goes_both_ways(sector, other)
 
@@ -282,7 +286,7 @@ def _mirrored(sector: CyclicSector, waves: Mapping[int, Structure], k: int) -> b
 def _written(
     sector: CyclicSector, wanted: Sequence[int], moving: Mapping[int, Structure], write: Write
 ) -> tuple[dict[int, Structure], Matrix]:
-    """Return the waves in other coordinates and the operator to the gaps, which has to be the same in all."""
+    """Return the waves in other coordinates and their gap operator, which must be the same for all."""
     waves: dict[int, Structure] = {}
     operators: dict[int, Matrix] = {}
     for k in wanted:
@@ -302,10 +306,10 @@ def _written(
 
 
 def _refuse_lost_contacts(sector: CyclicSector, place: IntArray, own: Matrix, following: Matrix | None) -> None:
-    """Refuse contacts on dofs that the reduction does not keep: few modes know little of forces there."""
+    """Refuse contacts on dofs that are not kept: a few modes describe the response to forces there badly."""
     operators = [own] if following is None else [own, following]
     used = np.unique(np.concatenate([operator.nonzero()[1] for operator in operators]))
-    # what lies on the high face moves with its partners on the low one
+    # dofs on the high face follow their partners on the low one
     lost = np.setdiff1d(sector.wave_tie(0)[used].nonzero()[1], place)
     if lost.size:
         free = sector.independent
@@ -319,7 +323,7 @@ def _refuse_lost_contacts(sector: CyclicSector, place: IntArray, own: Matrix, fo
 
 
 def conjugate(structure: Structure) -> Structure:
-    """Return the wave that travels the other way."""
+    """Return the wave that travels in the opposite direction."""
     parts = (structure.mass, structure.damping, structure.stiffness)
     mass, damping, stiffness = (matrix.conj() for matrix in parts)
     basis = None if structure.basis is None else structure.basis.conj()

@@ -1,4 +1,4 @@
-"""Rotation of the coordinates of nodes: vectors turn, everything else stays."""
+"""Rotation of the coordinates of nodes: vectors are rotated, scalar coordinates stay."""
 
 import numpy as np
 import scipy
@@ -8,7 +8,7 @@ from stickslip.errors import input_error
 from stickslip.model.structure import Dofs
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-ROUNDING = 1e-14  # entries of a rotation matrix below are sines of multiples of pi
+ROUNDING = 1e-14  # smaller entries of a rotation matrix are zero: sines of multiples of pi with rounding
 
 
 def node_table(dofs: Dofs) -> IntArray:
@@ -17,14 +17,14 @@ def node_table(dofs: Dofs) -> IntArray:
     Parameters
     ----------
     dofs
-        Any table. Nodes of different parts differ; coordinates without a node number (-1) belong together where they
-        share their position.
+        Any table. Nodes of different parts are different nodes; coordinates without a node number (-1) belong to one node if they
+        have the same position.
 
     Returns
     -------
     numpy.ndarray
-        (p, 6) rows of the components ``x y z rx ry rz``, -1 where a node lacks one; modal and other scalar
-        coordinates are left out.
+        (p, 6) rows of the components ``x y z rx ry rz``, -1 for missing components; modal and other scalar coordinates are left
+        out.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def node_table(dofs: Dofs) -> IntArray:
         place[loose] = np.unique(at, axis=0, return_inverse=True)[1].reshape(-1)
     keys = np.column_stack([part, dofs.node[vector], place])
     first, owner = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
-    # nodes in the order in which the table names them first
+    # nodes in the order of their first occurrence in the table
     rank = np.empty(first.size, dtype=np.int64)
     rank[np.argsort(first)] = np.arange(first.size)
     table = np.full((first.size, 6), -1, dtype=np.int64)
@@ -56,7 +56,7 @@ def node_table(dofs: Dofs) -> IntArray:
 
 
 def dof_rotation(dofs: Dofs, rotation: FloatArray, place: str) -> Matrix:
-    """Return the matrix that turns the displacement vector of `dofs`.
+    """Return the matrix that rotates the displacement vector of `dofs`.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def dof_rotation(dofs: Dofs, rotation: FloatArray, place: str) -> Matrix:
     Raises
     ------
     InputError
-        If a node lacks a component that the rotation mixes with one it has.
+        If a node lacks a component that the rotation couples with one it has.
     """
     R = np.where(np.abs(rotation) < ROUNDING, 0.0, rotation)
     table = node_table(dofs)

@@ -1,9 +1,9 @@
 """All waves of one sector, with one factorisation of their common part.
 
-``A_k = A_0 + e^{iθ} A_1 + e^{-iθ} A_1ᵀ`` with real matrices for each wave number of a real sector, θ its phase angle; A_1 couples few dofs of
-a sector with the neighbour's: the columns of its low face, and of contacts with the neighbour. With these and copies of them for the
-neighbour's, the rest of the sector is the same in all waves, and real. It is eliminated once; a wave needs the factors of the dense
-Schur complement of its few dofs.
+The matrix of a wave with the phase angle θ is ``A_k = A_0 + e^{iθ} A_1 + e^{-iθ} A_1ᵀ``, with real matrices for a real sector. A_1
+couples the sector with a few dofs of its neighbour, on the low face and in contacts. With these dofs, and copies of them for
+the neighbour, kept, the rest of the sector is real and the same in all waves. It is eliminated once. Each wave then
+needs only the factors of a dense Schur complement of the coupling dofs.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import is_hermitian
 from stickslip.reduction.waves import wave
 
-MIN_SHARED_DOFS = 20_000  # dofs below which a wave is factorised by itself: it takes a second
-ROUNDING_OF_TERMS = 1e-12  # of the terms of an entry: a smaller difference is rounding
-ALIKE = 1e-14  # of the diagonal: the same of sums of entries
+MIN_SHARED_DOFS = 20_000  # with fewer dofs each wave is factorised alone, which takes about a second
+ROUNDING_OF_TERMS = 1e-12  # entry over the terms of which it is the difference: less is rounding
+ALIKE = 1e-14  # largest difference of two equal matrices, scaled by the diagonal
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class SharedInterior:
     parts
         A_0 and A_1 in CSR.
     coupling
-        (m,) dofs that couple to the sector behind.
+        (m,) dofs of the neighbour that couple with the sector: columns of A_1.
     factors
         Factors of all other dofs, with the Schur complement on `coupling` and its copies.
     """
@@ -49,7 +49,7 @@ class SharedInterior:
     factors: Multifrontal
 
     def factorise(self, wave_number: int, matrix: Matrix) -> Factorisation | None:
-        """Return the factorisation of the matrix of a wave; None if it is no member of the family, or not positive definite."""
+        """Return the factorisation of a wave's matrix; None if it does not belong to the family or is not positive definite."""
         phase = wave(wave_number, self.sectors).phase
         if not _alike(self._of_wave(phase), matrix):
             return None
@@ -69,7 +69,7 @@ class SharedInterior:
         return first + ahead + ahead.conj().T
 
     def _complement(self, phase: complex) -> ComplexArray:
-        """Return the Schur complement of a wave, some columns at a time: it may be large."""
+        """Return the Schur complement of a wave, computed in blocks of columns to save memory."""
         m, rest = self.coupling.size, self.factors.rest
         dense = np.empty((m, m), dtype=np.result_type(rest, phase), order="F")
         for first in range(0, m, COLUMNS):
@@ -108,7 +108,7 @@ def shared_interior(
     standing
         (n, n) real CSR matrix of wave number 0.
     travelling
-        Matrix of a wave that is not standing; a phase angle near 90° keeps the most digits.
+        Matrix of a wave that is not standing; a phase angle near 90° loses the fewest digits.
     wave_number
         Wave number of `travelling`.
     sectors
@@ -119,7 +119,7 @@ def shared_interior(
     Returns
     -------
     SharedInterior or None
-        None if the two do not belong to a family of real matrices, or the interior is not positive definite.
+        None if the two matrices do not belong to a family of real matrices, or the interior is not positive definite.
     """
     parts = _parts(standing, travelling, wave(wave_number, sectors).phase)
     if parts is None:
@@ -141,7 +141,7 @@ def shared_interior(
 
 
 def _parts(standing: Matrix, travelling: Matrix, phase: complex) -> tuple[Matrix, Matrix] | None:
-    """Return A_0 and A_1, from ``A_0 + A_1 + A_1ᵀ`` and one wave; None where rounding is all that is left of them or they are none."""
+    """Return A_0 and A_1 from ``A_0 + A_1 + A_1ᵀ`` and one travelling wave; None if there is no such family, or A_1 vanishes."""
     if np.iscomplexobj(standing) or standing.shape != travelling.shape:
         return None
     even = _without_rounding((standing - travelling.real) / (1 - phase.real), standing, travelling)
@@ -154,7 +154,7 @@ def _parts(standing: Matrix, travelling: Matrix, phase: complex) -> tuple[Matrix
 
 
 def _without_rounding(matrix: Matrix, *terms: Matrix) -> Matrix:
-    """Return the entries that are not small beside those of the terms they were made of."""
+    """Return `matrix`, a difference of `terms`, without entries that are rounding."""
     size = scipy.sparse.csr_array(sum(abs(term) for term in terms))
     found = scipy.sparse.coo_array(matrix)
     at = np.asarray(size[found.coords[0], found.coords[1]]).ravel()
@@ -164,7 +164,7 @@ def _without_rounding(matrix: Matrix, *terms: Matrix) -> Matrix:
 
 
 def _alike(one: Matrix, other: Matrix) -> bool:
-    """Whether two matrices differ by rounding."""
+    """Whether two matrices are equal up to rounding."""
     if one.shape != other.shape:
         return False
     size = scipy.sparse.diags_array(1 / np.sqrt(np.abs(other.diagonal())))
@@ -173,7 +173,7 @@ def _alike(one: Matrix, other: Matrix) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class WaveFamily:
-    """The waves of one sector at one speed; they share factors for the computation of modes.
+    """The waves of one sector at one speed, with shared factors for the computation of modes.
 
     Parameters
     ----------
@@ -193,7 +193,10 @@ class WaveFamily:
     say: Say = silent
 
     def shifted(self, wave_number: int, structure: Structure) -> tuple[float | None, Factors | None]:
-        """Return the common shift of all waves and the function that factorises ``K − shift M`` of one; None where a wave is better factorised alone."""
+        """Return the common shift of all waves, and the function that factorises ``K − shift M`` of this wave.
+
+        Both are None if factorising each wave alone is faster.
+        """
         if structure.n <= MIN_SHARED_DOFS or len(self.numbers) < 2 or self._shared is None:
             return None, None
         shift, shared = self._shared
@@ -205,7 +208,7 @@ class WaveFamily:
 
     @cached_property
     def _shared(self) -> tuple[float, SharedInterior] | None:
-        """The common factor of all waves, at the shift of wave 0."""
+        """The common shift of all waves, from wave 0, and their shared factors."""
         number = max(round(self.sectors / 4), 1)
         if 2 * number >= self.sectors:
             return None

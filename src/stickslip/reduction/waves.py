@@ -31,7 +31,7 @@ class Wave:
     Raises
     ------
     InputError
-        If there is no such wave number.
+        If the wave number is out of range.
     """
 
     wave_number: int
@@ -55,7 +55,7 @@ class Wave:
     def kind(self) -> Kind:
         """``standing`` at k = 0 and n_s/2, ``backward`` below n_s/2, ``forward`` above.
 
-        In the rotating frame, with the direction of rotation as forward: sector n leads sector 0 by n θ_k.
+        Directions are in the rotating frame, forward in the sense of rotation; sector n leads sector 0 by n θ_k.
         """
         if self.wave_number == 0 or 2 * self.wave_number == self.sectors:
             return "standing"
@@ -86,7 +86,7 @@ def excited_wave(engine_order: int, sectors: int, harmonic: int = 1) -> int:
     Parameters
     ----------
     engine_order
-        Number of waves of the pressure field around the casing; negative for a field that turns faster than the wheel.
+        Number of waves of the pressure field around the casing; negative for a field that rotates faster than the wheel.
     sectors
         Number of sectors.
     harmonic
@@ -95,7 +95,7 @@ def excited_wave(engine_order: int, sectors: int, harmonic: int = 1) -> int:
     Returns
     -------
     int
-        ``harmonic * engine_order mod sectors``, in the rotating frame, the wheel turning towards the next sector.
+        ``harmonic * engine_order mod sectors``, in the rotating frame; the wheel rotates towards the next sector.
     """
     check_sectors("excited_wave", sectors)
     return harmonic * engine_order % sectors
@@ -107,12 +107,12 @@ def to_waves(displacements: Matrix) -> ComplexArray:
     Parameters
     ----------
     displacements
-        (n_s, ...) of all sectors, each in its own axes.
+        (n_s, ...) displacements of all sectors, each in its own axes.
 
     Returns
     -------
     numpy.ndarray
-        (n_s, ...) complex, one row a wave number; the transform is unitary.
+        (n_s, ...) complex, one row for each wave number; the transform is unitary.
     """
     return np.asarray(np.fft.fft(displacements, axis=0, norm="ortho"))
 

@@ -1,7 +1,7 @@
 """The whole wheel, reduced wave by wave: a model for contacts between its sectors.
 
-Every wave number is reduced on its own, so the cost is that of sectors and the factorisations are those of sectors; back in
-physical coordinates all sectors have the same kept dofs, and the matrices are block-circulant.
+Every wave number is reduced on its own, so only matrices of the size of a sector are factorised. Back in physical coordinates
+all sectors have the same kept dofs, and the matrices are block-circulant.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,13 +30,13 @@ class ReducedWheel:
     Parameters
     ----------
     structure
-        The wheel: sector by sector the kept dofs in global axes, then modal coordinates. Sets are those of `wheel`:
-        ``tip`` of all sectors, ``sector3.tip`` of one.
+        The wheel: for each sector the kept dofs in global axes, then modal coordinates. Sets as in `wheel`: ``tip`` of all
+        sectors, ``sector3.tip`` of one.
     sector
         The full sector.
     waves
-        Reduced travelling waves of the wave numbers 0 to n_s/2, whose conjugates are the others; all wave numbers if
-        complex matrices distinguish the two directions.
+        Reduced travelling waves of the wave numbers 0 to n_s/2, since the others are their conjugates; all wave numbers if complex
+        matrices distinguish the two directions.
     to_global
         (m, m) rotation of a sector's coordinates by one pitch.
     """
@@ -78,8 +78,8 @@ class ReducedWheel:
         Parameters
         ----------
         force
-            (n,) load on the sector's dofs in N, real or complex: sector n carries ``R^n force exp(2πi k n / n_s)``. Forces
-            on the cut faces are this sector's share, as in an assembled load.
+            (n,) load on the sector's dofs in N, real or complex: sector n carries ``R^n force exp(2πi k n / n_s)``. Forces on the
+            cut faces are one sector's share, as in an assembled load.
         wave_number
             k: 0 for a steady centrifugal load, `excited_wave` of an engine order.
         """
@@ -133,7 +133,7 @@ def reduced_wheel(
         (k,) dofs that stay physical in every sector: contacts between sectors, excitation, outputs; none of
         the high face or on the axis. All components of a node, if the axis rotates them.
     n_modes
-        Number of modes kept for every wave number, and so of modal coordinates of every sector.
+        Number of modes kept for every wave number, which is also the number of modal coordinates of every sector.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
         dofs `keep` of the wave, as many coordinates in every wave.
@@ -144,13 +144,12 @@ def reduced_wheel(
     Returns
     -------
     ReducedWheel
-        Its spectrum is the union of those of the reduced travelling waves.
+        The reduced wheel; its spectrum is the union of the spectra of the reduced travelling waves.
 
     Raises
     ------
     InputError
-        If a kept dof is not among the coordinates of a travelling wave, or `reduce` does not return what is
-        described above.
+        If a kept dof is not among the coordinates of a travelling wave, or `reduce` does not return the structure described above.
 
     Notes
     -----
@@ -194,13 +193,13 @@ def reduced_wheel(
 
 
 def goes_both_ways(sector: CyclicSector, moving: Structure) -> bool:
-    """Whether the wave that travels the other way is the conjugate of `moving`, because real matrices do not distinguish the directions."""
+    """Whether the opposite wave is the conjugate of `moving`, because real matrices do not distinguish the directions."""
     own = (moving.stiffness, moving.mass)
     return not sector.structure.is_complex and all(is_hermitian(matrix) for matrix in own)
 
 
 def refuse_reduced(who: str, sector: CyclicSector) -> None:
-    """Refuse a sector that is a reduced model: a second reduction would lose its full field."""
+    """Refuse a sector that is a reduced model, since a second reduction would lose its full field."""
     if sector.structure.basis is not None:
         raise input_error(
             f"{who}: sector", "is a reduced model already", "Give the sector of the full model: it is reduced here."
@@ -210,7 +209,7 @@ def refuse_reduced(who: str, sector: CyclicSector) -> None:
 def reduced_wave(
     who: str, reduce: Reduce, sector: CyclicSector, wave_number: int, place: IntArray, n_modes: int
 ) -> Structure:
-    """Return a travelling wave reduced by `reduce`, whose result is checked.
+    """Return a travelling wave reduced by `reduce`, after checking its result.
 
     Parameters
     ----------
@@ -228,7 +227,7 @@ def reduced_wave(
     Raises
     ------
     InputError
-        If the result is no structure of the same model, or its first coordinates are not those of `place`.
+        If the result is no structure of the same model, or its first coordinates are not the dofs of `place`.
     """
     moving = travelling_wave(sector, wave_number)
     reduced = reduce(moving, place, n_modes)
@@ -275,7 +274,7 @@ def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
 
 
 def _circulant(blocks: list[Matrix], sectors: int, turn: FloatArray) -> ComplexArray:
-    """Return the matrix of the wheel from its waves 0 to n_s/2 or from all, in global axes."""
+    """Return the matrix of the wheel, in global axes, from its waves 0 to n_s/2 or from all waves."""
     waves = np.array([blocks[k] if k < len(blocks) else np.conj(blocks[sectors - k]) for k in range(sectors)])
     first = np.fft.ifft(waves, axis=0)  # coupling of sector n with sector 0, in sector axes
     size = len(turn)
