@@ -81,6 +81,7 @@ def asked_of(path):
     return asked, collect(asked.problem, points, asked.model.peak_output)
 
 
+@pytest.mark.validation
 def test_structural_damping_is_located_by_hill(tmp_path, monkeypatch):
     quick = partial(bifurcating.bifurcations, tolerance=1e-4)
     monkeypatch.setattr(bifurcating, "bifurcations", quick)

@@ -113,6 +113,7 @@ def wheel(tmp_path_factory):
     return ss.Study.from_file(path).model()
 
 
+@pytest.mark.validation
 def test_a_wheel_with_friction_peaks_as_all_its_sectors_in_time(wheel):
     order, rpm, seconds = 2, (3500.0, 10000.0), 0.3
     lowest, highest = (n * RPM for n in rpm)
@@ -146,6 +147,7 @@ SMALL = {
 }
 
 
+@pytest.mark.validation
 def test_the_example_tells_what_a_fast_run_up_takes_off_the_peak(tmp_path):
     """Small: one engine order, a coarse mesh; rates of which one is slow enough to be steady."""
     text = EXAMPLE.read_text()

@@ -305,6 +305,7 @@ def test_all_sectors_go_to_a_folder_beside_that_of_one(wheel, tmp_path):
     assert one.stat().st_size < whole.stat().st_size
 
 
+@pytest.mark.validation
 def test_every_sector_of_a_mistuned_wheel_moves_as_the_unreduced_wheel_says(wheel):
     model = replace(wheel[1], speed=0.0)
     more = np.array([0.04, -0.03, 0.0, 0.02, -0.05])

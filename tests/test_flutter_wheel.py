@@ -63,6 +63,7 @@ def test_a_mode_has_the_force_of_its_own_frequency(wave: int) -> None:
     assert mode.ratio == pytest.approx(other.ratio, rel=1e-3)
 
 
+@pytest.mark.validation
 def test_the_smaller_cycle_of_the_only_unstable_wave_is_that_of_all_sectors_in_time() -> None:
     problem, cycles = cycles_of(False)
     small, large = cycles
@@ -166,6 +167,7 @@ def test_of_a_wheel_without_all_its_waves_nothing_is_said() -> None:
         stability(replace(problem, system=replace(problem.system, structure=replace(few, engine_order=2))), point)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("concept", ["periodic", "decaying"])
 def test_nonlinear_modes_of_each_wave_begin_with_its_damping_in_the_flow_and_cross_zero_at_its_limit_cycle(
     concept,

@@ -195,6 +195,7 @@ def exact_errors(case, sweep, points, order=25):
     return np.array(found)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_accepted_differs_from_25_harmonics_by_less_than_the_threshold(name):
     make, sweep = CASES[name]

@@ -43,6 +43,7 @@ def test_frequencies_are_those_of_the_blisk_and_of_the_free_ring(tmp_path: Path)
             assert away < 6e-7 or hertz > found[diameter].max()  # beyond four modes, the ring's among them
 
 
+@pytest.mark.validation
 def test_optimum_of_the_limit_force(tmp_path: Path) -> None:
     """By [vary], with one harmonic as the reference has it."""
     limits = [2.85, OPTIMUM, 2.97]

@@ -37,6 +37,7 @@ def marched(law, gaps):
     return np.array(out)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", LAWS)
 def test_halved_steps_leave_a_quarter_of_the_error(name):
     coarse, middle, fine = (judged(LAWS[name], n).harmonics[1] for n in (128, 256, 1024))
@@ -46,6 +47,7 @@ def test_halved_steps_leave_a_quarter_of_the_error(name):
     assert np.max(np.abs(middle - fine)) < 2e-3 * np.max(np.abs(fine))
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", LAWS)
 def test_integration_over_compiled_laws_agrees(name):
     law = LAWS[name]

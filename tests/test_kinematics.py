@@ -632,6 +632,7 @@ def peak_of(system, force, sweep):
     return max(height), points[int(np.argmax(height))].omega / (2 * np.pi)
 
 
+@pytest.mark.validation
 def test_friction_joint_of_two_flexible_blocks():
     """Two ways over non-matching meshes give nearly the same peak, most of its height taken by friction.
 

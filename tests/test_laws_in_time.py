@@ -126,6 +126,7 @@ def harmonics(name: str, steps: int, start: Any = None) -> tuple[np.ndarray, Any
     return found.harmonics[:8], found.final
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_error_of_the_step_is_of_second_order(name: str) -> None:
     # the place of a switch within a step changes the error at random: the mean over neighbouring numbers of steps

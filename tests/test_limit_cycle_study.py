@@ -122,6 +122,7 @@ def test_the_ring_holds_two_waves_and_one_is_left(tmp_path: Path) -> None:
     assert "competing_waves" not in plots(outcome.tree)
 
 
+@pytest.mark.validation
 def test_waves_compete_in_time_and_what_has_no_flutter_says_so(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -243,6 +244,7 @@ def flow(folder: Path) -> dict[int, complex]:
     return fluid
 
 
+@pytest.mark.validation
 def test_blades_that_hardly_differ_come_to_the_cycle_of_the_tuned_wheel(tmp_path: Path) -> None:
     """Undamped modes of such a wheel stand still and are fed from one side as much as they lose on the other."""
     flow(tmp_path)

@@ -340,6 +340,7 @@ def test_a_repeated_pattern_and_a_seed_are_in_the_model(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, np.tile([0.01, -0.01], 6))
 
 
+@pytest.mark.validation
 def test_the_example_runs_small_and_a_worn_wheel_agrees_with_time_integration(tmp_path: Path) -> None:
     """Eight blades, one frequency near the peak, dampers slipping: `--verify` integrates all of them."""
     text = (ROOT / "examples" / "mistuned_wheel" / "study.toml").read_text()

@@ -73,6 +73,7 @@ def flange(stages, harmonics):
     return Flange(("first", "second"), tuple(s.structure.dof_set("flange") for s in stages.values()), tuple(harmonics))
 
 
+@pytest.mark.validation
 def test_all_harmonics_are_the_node_by_node_tie_and_fewer_are_softer(stages, tied):
     errors = []
     for most in (4, 9, AROUND // 2):

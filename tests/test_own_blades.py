@@ -154,6 +154,7 @@ def hands() -> tuple[Structure, np.ndarray, tuple[ElasticCoulomb, ...], np.ndarr
     return both, gaps, laws, static, force
 
 
+@pytest.mark.validation
 def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
     """Matrices, gaps, loads and a point in slip; the study writes them in the motion of contact points, a change of basis."""
     own = {"vary.load.shaker.ratio": f"[{RATIO}]", "part.damper.sections_m": str(list(SECTIONS))}

@@ -398,6 +398,7 @@ def test_flutter_beside_a_forced_vibration_is_what_a_march_by_hand_comes_to() ->
     assert sorted(lines) == pytest.approx([135.0, motion.omegas[1]], rel=1e-3)
 
 
+@pytest.mark.validation
 def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> None:
     """A cubic oscillator with an absorber: between two such points its forced motion is unstable."""
     mass, force = np.diag([1.0, 0.05]), 0.15

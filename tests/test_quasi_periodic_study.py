@@ -55,6 +55,7 @@ def rubbing(fed: float) -> ss.Model:
     )
 
 
+@pytest.mark.validation
 def test_a_motion_that_is_weakly_unstable_is_not_told_as_another_one() -> None:
     shapes = np.linalg.eigh(np.array([[4e4, -2e4], [-2e4, 5e4]]))[1]
     damping = shapes @ np.diag([3.0, -0.3]) @ shapes.T  # a multiplier of 1.007
@@ -115,6 +116,7 @@ accuracy_percent = 0.3
 """
 
 
+@pytest.mark.validation
 def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time(tmp_path: Path) -> None:
     """Blades that touch their neighbours: the wake drives wave 1, a fluid feeds wave 4."""
     flow(tmp_path)

@@ -31,7 +31,9 @@ def residual_norm(balance, x, omega):
     return np.max(np.abs(balance.linearise(x, omega).residual))
 
 
-@pytest.mark.parametrize("number", [pytest.param(3, marks=pytest.mark.validation), 12, 33])
+@pytest.mark.parametrize(
+    "number", [pytest.param(3, marks=pytest.mark.validation), 12, pytest.param(33, marks=pytest.mark.validation)]
+)
 def test_a_drawn_system_converges(number):
     drawn = draw(SEED, number)
     points = accepted_points(list(forced_response(drawn.system, drawn.load, drawn.sweep)))

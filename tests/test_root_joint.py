@@ -157,6 +157,7 @@ def command(*words):
     return " ".join(found.output.split())
 
 
+@pytest.mark.validation
 def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     """The example on a coarser mesh: pressed by the pull, its resonance falls as the flanks begin to slip."""
     blade = make_decks.blade(across=1, along=2, up=1, above=2)

@@ -81,6 +81,7 @@ def rubbing(structure, limit: float, stiffness: float, steps: int, periods: int 
     return np.abs(np.fft.rfft(kept, axis=0)[1]) * 2 / steps
 
 
+@pytest.mark.validation
 def test_the_orbit_of_the_tip_is_that_of_time_integration(tmp_path: Path) -> None:
     path = write(tmp_path, SMALL)
     done("run", str(path), "--no-report")

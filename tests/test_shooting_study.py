@@ -93,6 +93,7 @@ def test_a_chain_from_matrices_vibrates_so() -> None:
     assert wide < 5e-3
 
 
+@pytest.mark.validation
 def test_a_mass_that_meets_a_stop_vibrates_so() -> None:
     """The contact opens in every period: the error of the step is of first order there, and harmonics decay slowly."""
     worst, wide = held(model("impacting_mass"), [26.0, 30.0], (30, 60), steps=4096)
@@ -128,6 +129,7 @@ def four_masses_in_time(hertz: float, force: float, rtol: float, periods: int) -
     return [2 * np.mean((out.y[3] * turn)[part]) for part in (slice(samples), slice(samples, None))]
 
 
+@pytest.mark.validation
 def test_one_frequency_is_that_of_a_plain_integration_by_scipy() -> None:
     """No code is shared: the equations are written down in this test. The stop is not met, both sliders move."""
     data = model("four_masses").forced_response(method="shooting", frequencies_hz=[13.0], **OFF)["forced_response"]

@@ -41,6 +41,7 @@ def told(words: list[str]) -> None:
     assert found.exit_code == 0, found.output
 
 
+@pytest.mark.validation
 def test_researcher(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(EXAMPLES)

@@ -133,6 +133,7 @@ def stop(k: float, steps: int) -> ShootingResult:
     return shoot(structure, gap, [law], load, 0.7, np.array([0]), stepping=stepping)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("k", [1e2, 1e3])
 def test_the_error_of_the_step_is_known(k: float) -> None:
     # a mass that hits a stop, whose stiffness the steps follow well, hardly or not at all; with 64 steps it depends on rounding, and

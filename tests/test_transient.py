@@ -63,6 +63,7 @@ def test_friction_damped_oscillator_against_exact_event_driven_values(omega: flo
     assert abs(result.harmonics[1, 0]) == pytest.approx(GRIFFIN_EXACT[omega], rel=5e-6)
 
 
+@pytest.mark.validation
 def test_error_of_the_contact_force_is_of_second_order_in_the_step() -> None:
     # Where the switches fall within a step changes the error at random: average over neighbouring step sizes.
     def mean_error(steps: range) -> float:

@@ -30,6 +30,7 @@ def one_mass(contact: Contact, force: float, damping: float = 0.2) -> Machine:
     )
 
 
+@pytest.mark.validation
 def test_a_slider_that_sticks_is_a_spring() -> None:
     """Motion and multiplier are those of the mass on both springs."""
     machine = one_mass(Contact("slider", ONE, 0 * ONE, stiffness=3.0, limit=1e6), 1.0)
@@ -52,6 +53,7 @@ def test_a_slider_at_the_edge_of_the_places_at_which_it_sticks_is_a_spring() -> 
     assert found.multiplier == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
 
 
+@pytest.mark.validation
 def test_the_multiplier_of_a_mass_between_stop_and_slider_has_the_error_that_is_told() -> None:
     """The times at which a contact begins and ceases to act decide it: found with an eighth of the step, the same."""
     stop = Contact("stop", 0 * ONE, ONE, stiffness=400.0, clearance=0.3)
@@ -100,6 +102,7 @@ def test_the_middle_branch_of_a_hardening_oscillator_is_unstable() -> None:
     assert max(largest[0], largest[2]) < 0.99
 
 
+@pytest.mark.validation
 def test_the_turn_of_a_branch_is_found_beside_its_frequency() -> None:
     """Just beyond a turn no motion of the branch has the told frequency: the nearest is the turn's own, and farther off none of it counts."""
     machine = one_mass(Contact("cubic", ONE, 0 * ONE, stiffness=1.0), 0.3, damping=0.1)
@@ -177,6 +180,7 @@ def test_the_package_tells_the_multiplier_of_a_pad_that_lifts() -> None:
     assert abs(float(data.stability_multiplier[own]) - found.multiplier) <= error
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("number", "hz"), [(7, 385.9525), (18, 73.3909)])
 def test_a_stable_point_beside_a_fold_is_the_motion_that_is_stable(number: int, hz: float) -> None:
     """Seed 115006: few harmonics lay nearer to the unstable motion (multipliers 1.010 and 1.292), and more led to the stable one."""
@@ -191,6 +195,7 @@ def test_a_stable_point_beside_a_fold_is_the_motion_that_is_stable(number: int, 
     np.testing.assert_allclose(found.motion[1], told.motion[at][1], atol=0.01 * np.abs(found.motion[1]).max())
 
 
+@pytest.mark.validation
 def test_an_unstable_stretch_between_stable_points_with_too_few_harmonics_is_found() -> None:
     """Seed 117001, machine 11: both ends needed more harmonics, and between them the multiplier is 1.042; nothing is carried from such ends."""
     machine = draw(117001, 11)

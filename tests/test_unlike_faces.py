@@ -84,6 +84,7 @@ def test_a_constant_stress_passes_the_faces(free):
         np.testing.assert_allclose(structure.basis @ motion, field, atol=1e-12)
 
 
+@pytest.mark.validation
 def test_frequencies_converge_to_the_torsion_of_the_free_ring_and_to_those_of_a_matching_mesh():
     """Torsion of wave 0 in closed form: J2(κa) Y2(κb) = J2(κb) Y2(κa), ω² = κ² G/ρ."""
     a, b = 0.5, 1.0

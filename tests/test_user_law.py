@@ -44,6 +44,7 @@ def run(script: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.validation
 def test_own_law_agrees_with_the_built_in_one_and_is_compiled_once(tmp_path):
     script = shutil.copy(EXAMPLE, tmp_path)
     first, second = run(script), run(script)

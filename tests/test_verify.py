@@ -82,6 +82,7 @@ def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
     assert caplog.text.count("periodic after") == 6
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("law", ["jenkins", "dahl", "iwan"])
 def test_other_laws_are_integrated_and_agree(law: str, tmp_path: Path) -> None:
     """Two friction elements of a law and a stop with clearance: the balance with five harmonics is within 1 % at its peak."""
