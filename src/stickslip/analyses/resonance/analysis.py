@@ -24,9 +24,9 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.study.verdict import Verdict, doubt, to_json
 from stickslip.units import HZ, millimetres
 
-SWEEPS = 8  # at most, at values spread over those that are in question
+SWEEPS = 8  # largest number of sweeps, at values spread over those of peaks followed back
 UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
-HARMONICS = "harmonics"  # note: the highest peak with more of them
+HARMONICS = "harmonics"  # note: the highest peak with more harmonics
 
 
 def unmet_peaks(
@@ -55,7 +55,7 @@ def unmet_peaks(
         met |= {(p.peak, i): own for p, own in zip(here, met_by_a_sweep(search, here), strict=True)}
 
     def reached(peak: int, i: int) -> bool:
-        # what sweeps meet on both sides of a value, one would meet there
+        # a peak that sweeps meet on both sides of a value would be met there as well
         before = max((j for j in swept if j <= i), default=-1)
         after = min((j for j in swept if j >= i), default=len(values) - 1)
         return met.get((peak, before), False) and met.get((peak, after), False)
@@ -71,14 +71,14 @@ MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
 
 
 def _inputs(case: Case, model: Model) -> Question:
-    """Return what is followed; refuse what cannot be."""
+    """Return the problem of a job; refuse a case whose peaks cannot be followed."""
     question = question_of(case, model)
     LOG.info(f"resonance: peaks of {question.output} over {question.asked.parameter}")
     return question
 
 
 def _solve(inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterator[PeakPoint]:
-    """Yield the peaks that are not done."""
+    """Yield the missing points of the peaks."""
     if notes.get(LAST) is not None:
         return
     asked = inputs.asked
@@ -91,7 +91,7 @@ def _solve(inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterato
     except InputError as error:  # no peak in the range
         notes.put(LAST, {"problem": error.problem})
         return
-    # what was followed back from the last value before an interruption is none of the first ones
+    # peaks that an interrupted run has followed back from the last value do not count among the first ones
     first = notes.get(FIRST)
     known = [p for p in every if first is None or p.peak < first["peaks"]]
     later = 1 + max((p.peak for p in known), default=-1)
@@ -117,7 +117,7 @@ def _points_of(inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoin
     if asked.values is not None:
         yield from follow_peaks(search, asked.values, asked.peaks, done)
         return
-    # a curve by arc length is followed again to where it was left: it has no state but its points
+    # an interrupted curve by arc length is computed again from its beginning, since only its points are stored
     for peak in range(asked.peaks):
         known = sum(p.peak == peak for p in done)
         try:
@@ -127,11 +127,11 @@ def _points_of(inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoin
         except InputError as error:
             if peak == 0 or error.place != "peak":
                 raise
-            return  # there are no more
+            return  # no further peak
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say what is followed, and how many peaks there will be at most."""
+    """Return the line on the parameter and the largest number of peaks."""
     question = question_of(case, model)
     asked = question.asked
     count = len(asked.values) if asked.values else asked.points
@@ -154,7 +154,7 @@ def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
 
 
 def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, float]:
-    """Return by how much twice the harmonics and one change the highest peak, relatively; NaN where it is not found with them."""
+    """Return the relative change of the highest peak by twice the harmonics and one; NaN if it is not found with them."""
     maxima = [p for p in points if p.converged and p.is_maximum]
     if not maxima:
         return {}
@@ -162,14 +162,14 @@ def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, 
     order = more_than(inputs.asked.harmonics)
     how = represented(order, inputs.search.how.evaluator)
     more = represented_as(inputs.search, top, how)
-    # a peak by phase lies below the maximum, by what it says itself
+    # a peak by phase lies below the maximum by its field `below`
     there = top.amplitude * (1.0 + (top.below if np.isfinite(top.below) else 0.0))
     change = more.amplitude / there - 1.0 if more.converged else np.nan
     return {"change": change, "value": top.value, "peak": top.peak, "order": order}
 
 
 def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:
-    """Return the lowest place of the highest peak between two values; nothing where that is not found."""
+    """Return the minimum of the highest peak between two values; empty if it is not found."""
     r = inputs.search
     try:
         best = smallest_peak(r.system, r.load, r.parameter, between, r.omega_range, r.output, r.how)
@@ -191,7 +191,7 @@ def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
 
 
 def _lost(found: Resonances) -> int:
-    """Return how many points have no solution."""
+    """Return the number of points without a solution."""
     return sum(int(np.sum(peak.maximum == -1)) for peak in found.peaks)
 
 

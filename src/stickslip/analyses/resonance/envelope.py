@@ -13,7 +13,7 @@ from stickslip.response.resonances.point import PeakPoint
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Overtaking:
-    """A value of the parameter at which another peak becomes the highest, interpolated between two visited ones, in the order of visits."""
+    """A value of the parameter at which another peak becomes the highest, interpolated between two visited values."""
 
     value: float = column("1", "where another peak becomes the highest")
     before: int = column("1", "number of the peak that was")
@@ -29,7 +29,7 @@ def heights(points: Sequence[PeakPoint], values: Sequence[float]) -> FloatArray:
 
 
 def along_span(points: Sequence[PeakPoint]) -> tuple[FloatArray, list[float]]:
-    """Return (peaks, values) amplitudes of curves followed by arc length, interpolated, and all values; a curve counts up to its first fold."""
+    """Return (peaks, values) amplitudes of curves by arc length up to their first fold, interpolated, and the values."""
     count = 1 + max((p.peak for p in points), default=-1)
     curves = [_before_fold([p for p in points if p.peak == i]) for i in range(count)]
     values = np.unique([p.value for own in curves for p in own])
@@ -44,7 +44,7 @@ def along_span(points: Sequence[PeakPoint]) -> tuple[FloatArray, list[float]]:
 
 
 def _before_fold(curve: Sequence[PeakPoint]) -> list[PeakPoint]:
-    """Return the maxima of a curve as long as its value goes on in one direction."""
+    """Return the maxima of a curve up to the first reversal of the value."""
     found: list[PeakPoint] = []
     for point in curve:
         if not (point.converged and point.is_maximum):
@@ -79,7 +79,7 @@ def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaki
             continue
         gap = amplitude[a, [i, j]] - amplitude[b, [i, j]]
         if not np.all(np.isfinite(gap)) or gap[0] == gap[1]:
-            continue  # one of them is not known on both sides, or they are one peak
+            continue  # one peak is not known on both sides, or both are the same peak
         share = gap[0] / (gap[0] - gap[1])
         value = values[i] + share * (values[j] - values[i])
         there = amplitude[b, i] + share * (amplitude[b, j] - amplitude[b, i])

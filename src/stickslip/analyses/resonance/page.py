@@ -29,18 +29,18 @@ class Peaks(Node):
 
     @cached_property
     def found(self) -> Resonances:
-        """What was found."""
+        """The record of the case."""
         known: Resonances = record_of(Resonances, self.data)
         return known
 
     @property
     def amplitude(self) -> FloatArray:
-        """Of all points of all peaks, m."""
+        """Amplitudes of all points of all peaks, m."""
         return np.concatenate([peak.amplitude for peak in self.found.peaks])
 
 
 def amplitudes(view: Peaks) -> Plot:
-    """Show the amplitude of the peaks over the parameter, the lowest place of the highest, and where one overtakes another."""
+    """Draw the amplitude of the peaks over the parameter, the minimum of the highest peak, and overtakings."""
     found, scale = view.found, scale_for(view.amplitude, "m")
     figure = _over_parameter(found, [scale.factor * peak.amplitude for peak in found.peaks], scale.unit)
     figure.update_yaxes(title_text=f"amplitude of {found.output} ({scale.unit})", rangemode="tozero")
@@ -62,7 +62,7 @@ def amplitudes(view: Peaks) -> Plot:
 
 
 def frequencies(view: Peaks) -> Plot:
-    """Show the frequency of the peaks."""
+    """Draw the frequency of the peaks."""
     figure = _over_parameter(view.found, [peak.frequency_hz for peak in view.found.peaks], "Hz")
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = "Frequency of each peak, in the colours of the figure above."
@@ -70,7 +70,7 @@ def frequencies(view: Peaks) -> Plot:
 
 
 def phases(view: Peaks) -> Plot:
-    """Show how far the output is behind the force."""
+    """Draw the phase of the output against the force."""
     figure = _over_parameter(view.found, [peak.phase_deg for peak in view.found.peaks], "°")
     figure.update_yaxes(title_text="phase of the output (°)")
     caption = (
@@ -81,7 +81,7 @@ def phases(view: Peaks) -> Plot:
 
 
 def energies(view: Peaks) -> Plot:
-    """Show what the loads put in, and the part of it that friction takes."""
+    """Draw the work of the loads in a period, and the part dissipated by contacts."""
     peaks = view.found.peaks
     scale = scale_for(np.concatenate([peak.energy for peak in peaks]), "J")
     figure = _over_parameter(view.found, [scale.factor * peak.energy for peak in peaks], scale.unit)
@@ -102,7 +102,7 @@ def energies(view: Peaks) -> Plot:
 
 
 def peak_table(view: Peaks) -> Table:
-    """Return the peaks."""
+    """Return a table of the peaks."""
     rows = [
         _row(i + 1, peak, k) for i, peak in enumerate(view.found.peaks) for k in np.flatnonzero(peak.known).tolist()
     ]

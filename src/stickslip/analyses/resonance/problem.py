@@ -26,8 +26,8 @@ from stickslip.study.analysis import Case
 from stickslip.study.file.tables import OF_THE_MODEL
 from stickslip.units import HZ, RPM
 
-VALUE = "value"  # of a function in Python
-FACTORS = get_args(LoadName)  # on loads, which are no keys
+VALUE = "value"  # name of the parameter of a Python function
+FACTORS = get_args(LoadName)  # parameters that are factors on loads, and no keys
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If the parameter is none or changes nothing, one of its values is refused, a contact is rigid, or no load drives a harmonic.
+        If the parameter is unknown or changes nothing, one of its values is refused, a contact is rigid, or no load
+        drives a harmonic.
     """
     asked: ResonanceTable = case.settings.resonance
     if asked.parameter in case.values:
@@ -155,7 +156,7 @@ def _accepted_by_laws(problem: PeakProblem, asked: ResonanceTable) -> None:
 
 
 def _parameter(case: Case, asked: ResonanceTable) -> Parameter:
-    """Return what varies: a name that the solver knows, or the model of each value."""
+    """Return the parameter: a name that the solver knows, or the model as a function of the value."""
     name = asked.parameter
     if case.at is None or name in FACTORS or ("." not in name and name != VALUE):
         return name

@@ -1,4 +1,4 @@
-"""What is found of resonances over a parameter: a curve for each peak, where they overtake each other, and all of a case."""
+"""Records of resonances over a parameter: the curve of each peak, overtakings, and the record of a case."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from stickslip.response.resonances.point import PeakPoint
 from stickslip.study.analysis import Solved
 from stickslip.units import DEG, HZ
 
-NO_POINT = -2  # as `PeakCurve.maximum`, behind the points of a shorter curve
+NO_POINT = -2  # `PeakCurve.maximum` of the padding after the points of a shorter curve
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeakCurve:
-    """A peak along its points: at the values as they were visited, or along the curve."""
+    """Curve of a peak: its points in the order of the visited values, or along the arc length."""
 
     value: FloatArray = column("1", "value of the parameter", along="point")
     frequency_hz: FloatArray = column("Hz", "frequency of the peak", along="point")
@@ -32,13 +32,13 @@ class PeakCurve:
 
     @property
     def known(self) -> BoolArray:
-        """Which entries are points."""
+        """Mask of the entries that are points."""
         return np.asarray(self.maximum > NO_POINT)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Resonances:
-    """All that is found of a case."""
+    """Record of a case."""
 
     output: str = column("1", "output whose amplitude peaks")
     parameter: str = column("1", "what varies")
@@ -55,7 +55,7 @@ class Resonances:
 
     @property
     def smallest(self) -> tuple[float, float, float] | None:
-        """Value, amplitude (m) and frequency (Hz; NaN where two peaks are equally high) where the highest peak is lowest."""
+        """Minimum of the highest peak: value, amplitude (m), and frequency (Hz; NaN if two peaks are equally high)."""
         value, amplitude, hertz = self.smallest_value, self.smallest_amplitude, self.smallest_frequency_hz
         if value is None or amplitude is None or hertz is None or not np.isfinite(value):
             return None
@@ -63,7 +63,7 @@ class Resonances:
 
 
 def answer(solved: Solved) -> Resonances:
-    """Return what the job of a case has found, from its points and its notes."""
+    """Return the record of a case from the points and notes of its job."""
     points: Sequence[PeakPoint] = solved.records
     asked = solved.case.settings.resonance
     found: dict[str, Any] = {
@@ -82,7 +82,7 @@ def answer(solved: Solved) -> Resonances:
 
 
 def _lowest(noted: Mapping[str, Any], met: Sequence[Overtaking], least: float) -> dict[str, float]:
-    """Return where the highest peak is lowest: in the valley of one peak, or where one overtakes another; nothing if a visited value is lower than both."""
+    """Return the minimum of the highest peak: the valley of one peak, or an overtaking; empty if a visited value is lower."""
     places = [(m.amplitude, m.value, np.nan) for m in met]
     if "value" in noted:
         places.insert(0, (float(noted["amplitude"]), float(noted["value"]), float(noted["omega"]) / HZ))
@@ -102,7 +102,7 @@ def _curves(points: Sequence[PeakPoint], values: Sequence[float] | None) -> tupl
 
 
 def _curve(points: Sequence[PeakPoint], most: int) -> PeakCurve:
-    """Return the curve of a peak, filled up to so many points."""
+    """Return the curve of a peak, padded to `most` points."""
     rest = [np.nan] * (most - len(points))
 
     def along(number: Callable[[PeakPoint], float]) -> FloatArray:

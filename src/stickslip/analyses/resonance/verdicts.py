@@ -13,15 +13,15 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict, from_json
 from stickslip.units import millimetres
 
-FAR_BELOW = 0.01  # of the maximum beside it: by phase, a peak that is none
-ENOUGH = 0.01  # change of the highest peak by twice the harmonics
+FAR_BELOW = 0.01  # largest relative difference of a peak by phase from the maximum beside it
+ENOUGH = 0.01  # largest relative change of the highest peak by more harmonics
 SPARSE = 12  # values that the terminal prints of each peak
 
 
 def case_verdicts(
     label: str, case: Resonances, notes: Mapping[str, Mapping[str, Any]], values: Sequence[float]
 ) -> list[Verdict]:
-    """Return what is to be thought of a case with its notes, and the values that were visited, if any."""
+    """Return the verdicts on a case from its record, the notes of its job, and the visited values, if any."""
     found = list(from_json(str(notes.get("model", {}).get("verdicts", "[]"))))
     problem = str(notes.get("last", {}).get("problem", ""))
     if not case.peaks:
@@ -66,7 +66,7 @@ def _of_points(label: str, case: Resonances) -> list[Verdict]:
 
 
 def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
-    """Return doubts of peaks that are known from the last value alone."""
+    """Doubt peaks that were followed back from the last value and that no sweep has confirmed."""
     found = []
     which, value = (np.atleast_1d(noted.get(k, [])) for k in ("peak", "value"))
     for peak in np.unique(which):
@@ -83,7 +83,7 @@ def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
 
 
 def _of_joined(label: str, case: Resonances, values: Sequence[float]) -> list[Verdict]:
-    """Return notes of peaks that end because they have become another one; those that were followed back end towards the first value."""
+    """Note peaks that end because they merge with another one; peaks followed back end towards the first value."""
     found = []
     for i, peak in enumerate(case.peaks if values else ()):
         own = set(peak.value[np.isfinite(peak.value)].tolist())
@@ -134,7 +134,7 @@ def _values(values: np.ndarray) -> str:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints: the peaks of each case."""
+    """Return the terminal tables: the peaks of each case."""
     every = ((record_of(Resonances, case), head) for case, head in told_apart(data))
     return tuple(_table(found, head) for found, head in every if found.peaks)
 
