@@ -17,12 +17,12 @@ from stickslip.units import HZ
 
 
 def _lost(found: NonlinearModes) -> int:
-    """Return how many points have no motion."""
+    """Return the number of points without a motion."""
     return sum(int(np.count_nonzero(branch.status > 0)) for branch in found.branches)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say which modes are followed."""
+    """Return a line for each mode to follow."""
     question = question_of(case, model)
     each = [(wave, mode) for wave in question.waves for mode in question.followed(wave)]
     return tuple(

@@ -108,7 +108,7 @@ def _row(branch: ModeBranch) -> list[str]:
 
 
 def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
-    """Draw backbones over frequency responses; peaks lie on them as long as no other mode takes part."""
+    """Draw backbones over frequency responses; peaks lie on them unless another mode takes part."""
     modes, response = nodes.get(NAME), nodes.get("forced_response")
     if not isinstance(modes, Modes) or not isinstance(response, Response):
         return None
@@ -167,7 +167,7 @@ def _over_amplitude(view: Modes, own: Sequence[FloatArray]) -> go.Figure | None:
 def _over(
     view: Modes, over: Sequence[FloatArray], own: Sequence[FloatArray], title: str, unit: str
 ) -> go.Figure | None:
-    """Draw a quantity of each mode over another one; nothing where none has a point."""
+    """Draw a quantity of each mode over another one; None if no mode has a point."""
     every = np.concatenate(over)
     if not np.any(np.isfinite(every)):
         return None

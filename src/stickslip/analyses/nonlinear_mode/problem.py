@@ -40,7 +40,7 @@ class Question:
     label
         Label of the case.
     model
-        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes are those of the first output.
+        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes belong to the first output.
     asked
         The table [nonlinear_mode].
     waves
@@ -97,8 +97,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If a wave number or mode is unknown, a contact is rigid, no contact slips or opens and there are no amplitudes, or the model
-        cannot be assembled.
+        If a wave number or mode is unknown, a contact is rigid, no contact slips or opens and no amplitudes are given, or
+        the model cannot be assembled.
     """
     asked: NonlinearModeTable = case.settings.nonlinear_mode
     refuse_waves(NAME, asked.wave_numbers, model)
@@ -121,7 +121,7 @@ def question_of(case: Case, model: Model) -> Question:
 
 
 def _required(question: Question, wave: int) -> list[StuckMode]:
-    """Return the modes of a wave that are followed, all that are asked for."""
+    """Return the modes of a wave to follow; refuse a requested mode that does not exist."""
     modes, wanted = question.followed(wave), question.asked.modes
     missing = sorted(set(wanted) - {m.number for m in modes})
     if missing:

@@ -20,7 +20,7 @@ from stickslip.solve.status import Status
 from stickslip.study.analysis import Solved
 from stickslip.units import HZ
 
-END = "end"  # kind of the record behind the last one of a mode
+END = "end"  # kind of the record after the last point of a mode
 
 
 def _nothing() -> FloatArray:
@@ -90,7 +90,7 @@ class ModeRecord:
     @property
     def followed(self) -> Followed:
         """The point as the continuation stored it."""
-        kind: Kind = self.kind  # type: ignore[assignment]  # any but that of the end
+        kind: Kind = self.kind  # type: ignore[assignment]  # any kind but the end
         solution = Solution(self.x, self.status, self.iterations, self.residual_norm, 0.0, 0.0)
         point = Point(self.x, self.p, self.tangent, self.step, solution, self.orientation, bend=self.bend)
         return Followed(kind, self.index, self.level, point, Judged(self.bound), self.seconds)
@@ -122,7 +122,7 @@ def mode_record(wave_number: int, mode: StuckMode, way: ModeWay, found: Followed
 
 
 def _motion(way: ModeWay, found: Followed) -> dict[str, Any]:
-    """Return the motion at a point of a mode, by the names of the fields of `ModeRecord`; empty of what is no point."""
+    """Return the motion at a point of a mode, by the names of the fields of `ModeRecord`; empty if it is no point."""
     if not found.converged or found.kind not in ("point", "found", "between"):
         return {}
     motion = mode_point(way.curve, found)
@@ -307,7 +307,7 @@ def _motions(points: Sequence[ModeRecord]) -> FloatArray:
 
 
 def _every_motion(branches: Sequence[ModeBranch]) -> FloatArray:
-    """Return (branches, most points, most harmonics, n, 2) the motions of all modes, NaN where there is none."""
+    """Return the motions (branches, most points, most harmonics, n, 2) of all modes; NaN in the padding."""
     most = np.max([b.motions.shape for b in branches], axis=0)
     out = np.full((len(branches), *most), np.nan)
     for own, branch in zip(out, branches, strict=True):

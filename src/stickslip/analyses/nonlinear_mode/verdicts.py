@@ -13,8 +13,8 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
 from stickslip.units import millimetres, millimetres_between
 
-NONE = 1e-9  # damping ratio below which there is none
-LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
+NONE = 1e-9  # damping ratio of an undamped mode, at most
+LIFTS, AGAIN = "lift-off", "taken up again"  # parts of the text `Backbone.end`
 
 
 def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
@@ -26,7 +26,7 @@ def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
 
 
 def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
-    """Say of modes without doubts over which amplitudes they were followed, and the largest damping ratio of them."""
+    """State the range of amplitudes of the modes without doubts, and their largest damping ratio."""
     every = len(found.branches)
     amplitude = np.concatenate([branch.amplitude for branch in sound])
     most = sound[int(np.argmax([branch.largest_damping_ratio for branch in sound]))]
@@ -40,7 +40,7 @@ def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
 
 
 def _by_the_other_concept(found: NonlinearModes, branch: ModeBranch) -> str:
-    """Say what the other concept gives at the largest damping, where it differs by more than the accuracy; empty otherwise."""
+    """State the damping ratio by the other concept at the largest damping; empty if both agree within the accuracy."""
     ratio, other = branch.largest_damping_ratio, branch.other_damping_ratio
     if other is None or abs(ratio) <= NONE or abs(other - ratio) <= branch.accuracy * abs(ratio):
         return ""
@@ -78,7 +78,7 @@ def _of_branch(label: str, whole: NonlinearModes, branch: ModeBranch) -> list[Ve
 
 
 def _of_resonances(label: str, whole: NonlinearModes, branch: ModeBranch) -> list[Verdict]:
-    """Return what is to be thought of harmonics that meet other modes."""
+    """Return the verdicts on internal resonances: harmonics that meet other modes."""
     name = branch.name
     told = [text for text in branch.end.split("; ") if MEETS in text]
     over = [text for text in told if text.startswith(OVER)]
@@ -102,7 +102,7 @@ def _of_resonances(label: str, whole: NonlinearModes, branch: ModeBranch) -> lis
 
 
 def _of_harmonics(label: str, branch: ModeBranch) -> list[Verdict]:
-    """Return what is to be thought of the harmonics of a mode."""
+    """Doubt a mode whose frequency or damping ratio still changes with more harmonics."""
     name, change = branch.name, branch.change[branch.status == 0]
     if change.size and np.all(np.isnan(change)):
         why = f"{name}: was solved with one set of harmonics alone"
