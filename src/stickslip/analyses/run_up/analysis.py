@@ -18,13 +18,13 @@ from stickslip.study.analysis import Analysis, Case, Solved, of_tables
 
 
 def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
-    """Return the run-ups of all cases, and what is to be thought of them."""
+    """Return the dataset of the run-ups of all cases, with verdicts."""
     data = of_answers(solved, answer, case_verdicts, _lost)
     return data.assign_coords(mode=np.arange(1, data.sizes.get("mode", 0) + 1))
 
 
 def _lost(found: RunUp) -> int:
-    """Return how many points have no solution."""
+    """Return the number of points without a solution."""
     return sum(line.failed for line in found.lines)
 
 

@@ -17,7 +17,7 @@ from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _DASHES = ("dash", "dot", "dashdot", "longdash")
-_LARGEST, _SMALLEST = 26.0, 3.0  # markers of the largest and of no amplitude
+_LARGEST, _SMALLEST = 26.0, 3.0  # sizes of markers for the largest and for zero amplitude
 _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"]]
 
 
@@ -37,12 +37,12 @@ class RunUpView(Node):
 
     @property
     def output_name(self) -> str:
-        """Name of that output."""
+        """Name of the output whose peak is resolved."""
         return str(self.found.output_label[self.found.report_output or 0])
 
 
 def campbell_with_response(view: RunUpView) -> Plot:
-    """Show the amplitudes on the lines of their engine orders, between natural frequencies with stuck and open contacts."""
+    """Draw a Campbell diagram with stuck and open contacts, and the amplitudes on its engine-order lines."""
     found = view.found
     hz, amplitude = np.array([point.frequency_hz for point in found.points]), view.amplitude(found.points)
     scale = scale_for(amplitude, "m")
@@ -127,7 +127,7 @@ def campbell_with_response(view: RunUpView) -> Plot:
 
 
 def amplitudes(view: RunUpView) -> Plot:
-    """Show the amplitude of each engine order over the speed."""
+    """Draw the amplitude of each engine order over the speed."""
     scale = scale_for(view.amplitude(view.found.points), "m")
     figure = go.Figure()
     for i, line in enumerate(view.found.lines):
@@ -151,7 +151,7 @@ def amplitudes(view: RunUpView) -> Plot:
 
 
 def fast(view: RunUpView) -> Plot | None:
-    """Show fast run-ups beside the steady response."""
+    """Draw fast run-ups and the steady response."""
     found = view.found
     if not found.fast:
         return None
@@ -187,7 +187,7 @@ def fast(view: RunUpView) -> Plot | None:
 
 
 def fast_peaks(view: RunUpView) -> Table | None:
-    """Return the peaks of fast run-ups as a table."""
+    """Return a table of the peaks of fast run-ups."""
     if not view.found.fast:
         return None
     rows = [
@@ -207,7 +207,7 @@ def fast_peaks(view: RunUpView) -> Table | None:
 
 
 def static_forces(view: RunUpView) -> Plot:
-    """Show how the static normal force of the contacts grows with the speed."""
+    """Draw the static normal force of the contacts over the speed."""
     rpm, force = view.found.static_speed_rpm, view.found.lines[0].static_normal_n
     figure = go.Figure(go.Scatter(x=rpm, y=force, mode="lines+markers", line={"color": colour(0)}, showlegend=False))
     styled(figure, 360)
@@ -221,7 +221,7 @@ def static_forces(view: RunUpView) -> Plot:
 
 
 def peaks(view: RunUpView) -> Table:
-    """Return the peaks as a table."""
+    """Return a table of the peaks."""
     rows = []
     for line in view.found.lines:
         top = view.found.peak(line)

@@ -117,7 +117,7 @@ class Along:
 
 
 def _unconstrained(structure: Structure, line: SpeedLine) -> Structure:
-    """Return a structure on the motions that its constraints leave."""
+    """Return a structure on the motions that its constraints allow."""
     way = own_motions(structure, line.multipliers)
     return in_coordinates(structure, way, structure.dofs.take(np.arange(way.shape[1])), {})
 
@@ -177,13 +177,13 @@ def question_of(case: Case, model: Model) -> Question:
         sweep = measured(sweep, turning)
         sweep = within_limits(turning, sweep, settings.limits)
         check_limits(settings.limits, estimate(turning, sweep))
-        # peaks are judged towards up to three times the harmonics that are kept
+        # peaks are judged with up to three times the kept harmonics
         harmonics, tolerance = JUDGED_MULTIPLE * sweep.high_harmonics[-1], table.tolerance
         found = over_speed(turning, order, table.speeds, harmonics, case.store, tolerance)
         own = peak_first(found.assembled)
         said = found.error, found.static_force, model.coriolis, found.common
         along = Along(own, sweep, *said)
-        forced_problem(own.system, own.load, sweep)  # what cannot be solved is refused now
+        forced_problem(own.system, own.load, sweep)  # raises the refusals of the solver now
         lines.append(along)
     return Question(
         case.label,

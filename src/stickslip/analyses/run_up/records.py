@@ -164,7 +164,7 @@ def steady_run_up(question: Question, points: Sequence[RunUpPoint]) -> RunUp:
 def line_of(
     along: Along, response: Response, offset: int, open_hz: FloatArray, stuck_hz: FloatArray, force: FloatArray
 ) -> Line:
-    """Return the record of an engine order, of whose points the first has the index `offset`."""
+    """Return the record of an engine order; `offset` is the index of its first point."""
     top = response.top
     speeds = [a.point.omega for a in response.accepted]
     return Line(
@@ -186,7 +186,7 @@ def line_of(
 
 
 def _in_order(response: Response) -> list[Accepted]:
-    """Return the points in the order of the speed; where the branch turns, along it, and points of its peak last."""
+    """Return the points by rising speed; if the branch turns, along the branch, with refinements of its peak last."""
     branch = [a.point.omega for a in response.accepted if a.point.stage not in OF_PEAK]
     turns = bool(np.ptp(np.sign(np.diff(branch))) > 0) if len(branch) > 2 else False
     every = list(response.accepted)
@@ -207,7 +207,7 @@ def points_of(along: Along, response: Response) -> list[LinePoint]:
                 amplitude=accepted.amplitudes(len(along.model.output_labels)),
                 converged=point.converged,
                 harmonic=point.order,
-                # what was solved tells more than a prediction
+                # an audit is more reliable than a prediction
                 error=accepted.own_error if np.isnan(accepted.audit_error) else accepted.audit_error,
                 dissipated_w=dissipated,
                 slipping=slipping,
@@ -228,7 +228,7 @@ def _states(along: Along, accepted: Accepted) -> tuple[float, float, float]:
 
 
 def static_forces(lines: Sequence[Along]) -> tuple[FloatArray, FloatArray]:
-    """Return (k,) speeds of the first line that has most, rad/s, and (lines, k) static normal forces at them, N."""
+    """Return (k,) speeds of the line with the most speeds, rad/s, and (lines, k) static normal forces at them, N."""
     most = max(len(a.line.speeds) for a in lines)
     widest = next(a for a in lines if len(a.line.speeds) == most).line.speeds
     found = np.full((len(lines), most), np.nan)

@@ -18,13 +18,13 @@ from stickslip.study.store.archive import flat, from_flat
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, RPM
 
-MAX_FAST_HARMONIC = 7  # harmonic beyond which a fast run-up does not go, but for those that loads drive
+MAX_FAST_HARMONIC = 7  # highest harmonic of a fast run-up, unless loads drive higher ones
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
-JUDGED_PEAK_SHARE = 0.5  # share of the peak above which the second derivative is held against the first
+JUDGED_PEAK_SHARE = 0.5  # share of the peak, above which the second derivative is compared with the first
 
 
 def solve(inputs: Question, done: Sequence[RunUpPoint], notes: Notes) -> Iterator[RunUpPoint]:
-    """Yield the points that are not done, one engine order after the other; store the record of the case."""
+    """Yield the missing points, one engine order after the other; store the record of the case."""
     if notes.get(FOUND) is not None:
         return
     every = list(done)
@@ -51,14 +51,14 @@ def _points_of(along: Along, every: Sequence[RunUpPoint], before: float, count: 
                 before + 0.95 * share / count,
                 f"engine order {along.order}: {rpm:.1f} rpm, {point.omega / HZ:.2f} Hz, H = {point.order}{state}",
             )
-    except NO_SOLUTION as error:  # what was found before counts
+    except NO_SOLUTION as error:  # points found before are kept
         LOG.info(f"engine order {along.order}: {error}")
 
 
 def _fast_run_ups(
     question: Question, steady: Sequence[Line], points: Sequence[RunUpPoint], notes: Notes
 ) -> tuple[FastRunUp, ...]:
-    """Return all fast run-ups; each is noted when it is finished."""
+    """Return all fast run-ups; each is stored in the notes when it is finished."""
     found = list[FastRunUp]()
     jobs = [(*both, rate) for both in zip(question.lines, steady, strict=True) for rate in question.rates]
     for along, line, rate in jobs:
@@ -73,7 +73,7 @@ def _fast_run_ups(
 
 
 def _order(along: Along, points: Sequence[RunUpPoint]) -> int:
-    """Return the highest harmonic that the steady points of an engine order keep, and the load drives."""
+    """Return the highest harmonic of a fast run-up: of the steady points, within `MAX_FAST_HARMONIC`, or of the load."""
     own = [p.order for p in points if p.engine_order == along.order and p.converged]
     return max(min(max(own, default=1), MAX_FAST_HARMONIC), *along.problem.driven)
 
@@ -82,7 +82,7 @@ def _fast_run_up(along: Along, steady: Line, rate: float, order: int) -> FastRun
     """Return a fast run-up; one without amplitudes if it could not begin."""
     try:
         return _swept(along, steady, rate, order)
-    except NO_SOLUTION as error:  # the steady motions count
+    except NO_SOLUTION as error:  # the steady motions are kept
         LOG.info(f"engine order {along.order} at {rate:g} rpm/s: {error}")
         begin = np.array([along.sweep.ends[0] / along.order / RPM])
         return fast_run_up(steady, rate, begin, np.array([np.nan]), harmonic=order)
@@ -114,7 +114,7 @@ def _swept(along: Along, steady: Line, rate: float, order: int) -> FastRunUp:
 def _kept(
     points: Iterator[EnvelopePoint], driven: list[int], outputs: Any
 ) -> Iterator[tuple[float, ComplexArray, bool]]:
-    """Yield frequency, driven harmonics (d,) of all outputs, and whether a step was solved; nothing else is kept of a step."""
+    """Yield frequency, driven harmonics (d,) of the first output, and whether a step was solved; drop all else of a step."""
     for point in points:
         yield point.omega, point.coefficients[driven][:, outputs[0]], point.converged
 
@@ -137,7 +137,7 @@ def neglected(time: FloatArray, amplitude: ComplexArray, omega: FloatArray) -> f
     second = 2 * (slopes[1:] - slopes[:-1]) / (before + after)
     size = np.abs(amplitude[1:-1])
     near = size > JUDGED_PEAK_SHARE * size.max()
-    weight = (before + after)[near]  # so that many short steps do not count more
+    weight = (before + after)[near]  # many short steps must not count more
     there = np.sum(weight * np.abs(second[near]) ** 2)
     here = np.sum(weight * np.abs(2 * omega[1:-1][near] * first[near]) ** 2)
     return float(np.sqrt(there / here)) if here > 0.0 else float("nan")

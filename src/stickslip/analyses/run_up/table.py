@@ -54,6 +54,6 @@ class RunUpTable(Section):
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """In rad/s."""
+        """Lowest and highest speed, rad/s."""
         lowest, highest = (RPM * n for n in self.speeds_rpm)
         return lowest, highest

@@ -12,8 +12,8 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.store.netcdf import one_case
 from stickslip.study.verdict import Verdict, from_json
 
-TOO_FAST = 0.05  # share that slowly varying amplitudes leave out, above which there is a doubt
-BETWEEN = 1e-5  # error between the speeds of the model above which there is a doubt
+TOO_FAST = 0.05  # share neglected by slowly varying amplitudes, above which there is a doubt
+BETWEEN = 1e-5  # error of the model between its speeds, above which there is a doubt
 UNKNOWN = Verdict(
     "trusted",
     why="no motion of the run-up was examined for stability",
@@ -22,7 +22,7 @@ UNKNOWN = Verdict(
 
 
 def case_verdicts(label: str, found: RunUp) -> list[Verdict]:
-    """Return the verdicts on a case, with those on its models."""
+    """Return the verdicts on a case and on its models."""
     if not found.lines:
         return []
     told = [replace(v, case=label) for v in (*from_json(found.doubts), UNKNOWN)]
@@ -91,7 +91,7 @@ def _of_fast(label: str, fast: FastRunUp) -> Iterator[Verdict]:
             "Take a smaller range of speeds, or another rate.",
         )
     elif fast.peak_at_end:
-        # no peak was passed, whose error could be told
+        # without a peak there is no error of a peak
         yield Verdict(
             "trusted",
             label,
@@ -111,7 +111,7 @@ def _of_fast(label: str, fast: FastRunUp) -> Iterator[Verdict]:
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
-    """Return what the terminal prints."""
+    """Return the terminal tables."""
     told = []
     for k, label in enumerate(data["case_label"].values):
         found: RunUp = record_of(RunUp, one_case(data, k))
@@ -154,7 +154,7 @@ def _peaks(found: RunUp, head: str) -> TextTable:
 
 
 def _fast(every: tuple[FastRunUp, ...], head: str) -> TextTable:
-    """Return the fast run-ups beside the steady peaks."""
+    """Return the table of fast run-ups and steady peaks."""
     rows = tuple(
         (
             f"{fast.engine_order}",
