@@ -14,12 +14,12 @@ from stickslip.units import HZ
 
 
 def _lost(found: QuasiPeriodic) -> int:
-    """Return at how many frequencies no motion was found."""
+    """Return the number of frequencies without a motion."""
     return sum(not point.solved for point in found.points)
 
 
 def _check(case: Case, model: Model) -> tuple[str, ...]:
-    """Say what the second frequency is, and how many unknowns there are."""
+    """Return lines on the second frequency and the number of unknowns."""
     question = question_of(case, model)
     first = HZ * question.asked.first_hz[0]
     size = question.problem().balance.size

@@ -18,7 +18,7 @@ from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 
 SHOWN = 6  # motions drawn one by one
-FAINT = 1e-4  # of the largest: combined frequencies that are not drawn
+FAINT = 1e-4  # share of the largest amplitude, below which combined frequencies are not drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class TwoTonesView(Node):
 
     @property
     def drawn(self) -> list[TwoFrequencies]:
-        """An even selection of them."""
+        """An even selection of these motions."""
         there = self.there
         few = np.unique(np.linspace(0, len(there) - 1, min(SHOWN, len(there))).round().astype(int))
         return [there[i] for i in few] if there else []

@@ -24,11 +24,12 @@ from stickslip.study.analysis import Case
 from stickslip.units import HZ, RPM
 
 NAME = "quasi_periodic"
-APART = 1000  # harmonics of the second loads of a single structure while they are assembled with the first
-MARCHED = 5.0  # times the steps that an estimate is for, in a comparison in time
-SOON = 30.0  # seconds that comparisons of a case may take which nobody asked for
-MODES = 12  # whose growth is looked at
-MOST_RATIO = 100.0  # of the second frequency to the first: contacts are sampled as finely as the faster one needs, over many turns of the slower
+APART = 1000  # offset of the harmonics of second loads while they are assembled with the first loads
+MARCHED = 5.0  # time steps of a comparison over the steps of `seconds_in_time`
+SOON = 30.0  # largest estimated seconds of all comparisons of a case without request
+MODES = 12  # modes whose growth is examined
+# largest ratio of the second frequency to the first: contacts are sampled for the faster one, over many turns of the slower
+MOST_RATIO = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +156,7 @@ def question_of(case: Case, model: Model) -> Question:
     )
     if wheel and not second:
         question = replace(question, waves=(orders[0] or 0, _wave(question)))
-    question.problem()  # what cannot be solved is refused now
+    question.problem()  # raises the refusals of the solver now
     return question
 
 
@@ -187,7 +188,7 @@ def _check_second(asked: QuasiPeriodicTable, second: Mapping[str, Load]) -> None
 
 
 def _wave(question: Question) -> int:
-    """Return the wave number of a tone that nothing drives."""
+    """Return the wave number of a self-excited tone."""
     if question.asked.second_wave is not None:
         return question.asked.second_wave
     growing = question.growing()
@@ -201,7 +202,7 @@ def _wave(question: Question) -> int:
 
 
 def _plain(load: Load, *, wheel: bool) -> Load:
-    """Return a load as it is assembled: those of the second frequency of a single structure in harmonics of their own."""
+    """Return a load as it is assembled; second loads of a single structure get harmonics of their own."""
     if not load.second:
         return load
     apart = 0 if wheel else APART
@@ -220,7 +221,7 @@ def _one_order(name: str, loads: Mapping[str, Load]) -> int | None:
 
 
 def _of(assembled: Assembled, loads: Mapping[str, Load], keys: Mapping[str, int]) -> dict[int, Any]:
-    """Return the harmonics of loads, those of their own frequency."""
+    """Return the forces of loads by the harmonics of their own frequency."""
     return {load.harmonic: assembled.load.harmonics[keys[name]] for name, load in loads.items()}
 
 

@@ -87,7 +87,7 @@ def answer(solved: Solved) -> QuasiPeriodic:
 
 
 def _alike(points: Sequence[TwoFrequencies]) -> tuple[TwoFrequencies, ...]:
-    """Return motions with as many combined frequencies each, (0, 0) behind their own, and without what time integration found of none."""
+    """Return motions padded by (0, 0) to the same number of combined frequencies; without any result in time these are None."""
     most = max((len(p.indices) for p in points), default=0)
     points = [replace(p, indices=np.pad(p.indices, ((0, most - len(p.indices)), (0, 0)))) for p in points]
     if any(p.time_largest is not None and np.any(np.isfinite(p.time_largest)) for p in points):

@@ -19,7 +19,7 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres_between
 
 PHASES = 96
-GRID = 64  # phases of either frequency, over which the largest distance from the mean is taken
+GRID = 64  # phases of each frequency, over which the largest distance from the mean is taken
 FAILED = (StickslipError, FloatingPointError, np.linalg.LinAlgError)
 
 
@@ -84,7 +84,10 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
 def _in_time(
     question: Question, problem: TwoTones, motion: TorusMotion, kind: str
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Return largest and smallest amplitude (outputs,) in time, and the difference from the balance (NaN for a self-excited tone); None for one tone or a failure."""
+    """Return largest and smallest amplitude (outputs,) in time, and the difference from the balance; None without a result.
+
+    The difference is NaN for a self-excited tone. One tone alone and a failed integration have no result.
+    """
     try:
         if kind == "two loads":
             return two_loads_in_time(problem, motion, question.first, question.second)
@@ -99,7 +102,7 @@ def _in_time(
 def _found(
     question: Question, omega: float, before: TwoFrequencies | None
 ) -> tuple[TwoTones, TorusMotion | None, str, str, str]:
-    """Return the problem, its motion, what its second frequency is, why, and what is not known where there is none."""
+    """Return problem, motion, kind of the second frequency and the reason, and what is unknown without a second tone."""
     problem = question.problem()
     if question.driven:
         omegas = omega, question.second_frequency(omega)
@@ -160,7 +163,7 @@ def _of_tone(
 
 
 def _guesses(question: Question, problem: TwoTones, omega: float) -> tuple[list[float], str]:
-    """Return near which frequencies a second tone is looked for, rad/s, and why more may grow; empty where that is known."""
+    """Return frequencies near which a second tone is sought, rad/s, and why more tones may grow; empty if none can."""
     if question.asked.second_hz is not None:
         return [HZ * question.asked.second_hz], ""
     wave = None if question.waves is None else question.waves[1] % question.model.sectors
@@ -185,7 +188,7 @@ def _free(motion: TorusMotion) -> Solving:
 
 
 def _begun(problem: TwoTones, before: TwoFrequencies) -> tuple[TwoTones, FloatArray]:
-    """Return the problem with the combined frequencies of another motion, and that motion."""
+    """Return the problem with the combined frequencies of another motion, and the unknowns of this motion."""
     indices: Indices = tuple((int(j), int(k)) for j, k in before.indices)
     own = problem.with_indices(indices)
     return own, own.balance.unknowns(before.unknowns[..., 0] + 1j * before.unknowns[..., 1])

@@ -12,8 +12,8 @@ from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, millimetres_between
 
-LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful whatever was asked for
-SLIP = 5e-3  # rad a turn, the same
+LARGE = 0.02  # share left out, or difference from time integration, above which any motion is doubtful
+SLIP = 5e-3  # the same for the error of the second phase, rad a turn
 
 
 def case_verdicts(label: str, case: QuasiPeriodic) -> list[Verdict]:
@@ -45,7 +45,7 @@ def _of_point(label: str, point: TwoFrequencies, asked: float) -> list[Verdict]:
 
 
 def _of_time(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
-    """Yield a doubt where time integration comes to another motion."""
+    """Doubt a motion if time integration reaches another one."""
     hz = point.first / HZ
     away = np.nan if point.time_off is None else point.time_off
     if away > LARGE:
@@ -63,7 +63,7 @@ def _of_time(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
 
 
 def _left_out(label: str, hz: float, share: float, asked: float) -> list[Verdict]:
-    """Return a doubt where combined frequencies left out count, or count more than was asked for."""
+    """Doubt a motion if the combined frequencies left out exceed the requested accuracy or `LARGE`."""
     if share <= min(asked, LARGE):
         return []
     left = f"combined frequencies left out would change the motion by {100 * share:.2g} %"
@@ -82,7 +82,7 @@ def _without(label: str, hz: float, why: str, unknown: str) -> Verdict:
 
 
 def _unexamined(label: str, point: TwoFrequencies) -> Iterator[Verdict]:
-    """Yield a doubt where no time integration says whether the motion is left."""
+    """Doubt a motion whose stability was not examined by time integration."""
     hz, told = point.first / HZ, "its stability was not examined"
     if point.time_largest is None:
         remedy = "Set quasi_periodic.in_time = true, of a single structure."
