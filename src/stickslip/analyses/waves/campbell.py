@@ -19,7 +19,7 @@ from stickslip.units import RPM
 
 
 def _numbers(asked: CampbellTable, wheel: Wheel) -> tuple[int, ...]:
-    """Return the wave numbers of the requested nodal diameters, else of those excited by the engine orders."""
+    """Return the wave numbers of the requested nodal diameters, or else the waves excited by the engine orders."""
     if asked.nodal_diameters is not None:
         return wheel.numbers(asked.nodal_diameters)
     return tuple(sorted({wheel.diagram(m) for m in asked.engine_orders}))
@@ -42,7 +42,7 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Ve
 
 
 def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable) -> list[tuple[int, float]]:
-    """Return engine orders that rise above all followed modes of their wave, and the speed in rpm from which they do."""
+    """Return engine orders that rise above all followed modes of their wave, each with the speed at which it does, rpm."""
     known = {w.wave_number: w.frequencies_hz for w in waves}
     found = []
     for order in sorted(asked.engine_orders):

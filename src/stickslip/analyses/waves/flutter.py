@@ -22,7 +22,7 @@ from stickslip.study.analysis import Case, Notes, Solved
 from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, RPM
 
-INFLUENCE, WHEEL = ("influence", "wheel")  # notes of the coefficients, and of a wheel whose sectors differ
+INFLUENCE, WHEEL = ("influence", "wheel")  # notes with the coefficients, and with the modes of a mistuned wheel
 EVERY = 2.0  # degrees of inter-blade phase angle between points of the curve
 
 
@@ -68,7 +68,7 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Flutter, list[Ver
             WheelFlutter(damping=d, frequency_hz=f) for d, f in zip(damping_ratio(own), own.imag / HZ, strict=True)
         ),
     )
-    # of a wheel whose sectors differ no wave is a mode
+    # the waves are no modes of a mistuned wheel
     told = unstable_wheel(own, asked) if own.size else unstable(waves, total, sectors, asked)
     return found, [
         *told,

@@ -28,7 +28,7 @@ from stickslip.study.analysis import Case, Notes, Solved
 from stickslip.study.verdict import Verdict
 from stickslip.units import RPM
 
-WHEEL = "mistuned"  # note of a job with the modes of a wheel whose sectors differ
+WHEEL = "mistuned"  # note with the modes of a mistuned wheel
 
 
 def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
@@ -120,7 +120,9 @@ def _solve(inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: 
         return
     yield from each_wave(solve_wave, inputs, done, notes)
     model = inputs.model
-    if model.mistuning is not None and notes.get(WHEEL) is None:  # as many a blade as the table asks for a wave
+    if (
+        model.mistuning is not None and notes.get(WHEEL) is None
+    ):  # as many modes a sector as the table requests for a wave
         found = wheel_modes(model, inputs.n_modes * model.sectors, inputs.contacts)
         arrays = found.frequencies_hz, found.sector_share, found.wave_share
         notes.put(WHEEL, dict(zip(("mistuned_hz", "sector_share", "wave_share"), arrays, strict=True)))

@@ -18,7 +18,7 @@ _SHARE = "share of the kinetic energy of a mode of the wheel"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Wave:
-    """A travelling wave; a job leaves diameter and kind to the result."""
+    """A travelling wave; the dataset adds nodal diameter and kind to the record of a job."""
 
     wave_number: int = column("1", "wave number of the travelling wave")
     nodal_diameter: int = column("1", "nodal diameter", default=0)
@@ -177,7 +177,7 @@ class Flutter(ModelFacts):
 
     @property
     def damping(self) -> FloatArray:
-        """(w, n) damping ratios of all waves, with that of the structure."""
+        """(w, n) damping ratios of all waves, structural damping included."""
         return np.array([w.damping for w in self.waves])
 
 
@@ -217,7 +217,7 @@ _STATES = {
 
 
 def contact_state(contacts: str | None) -> str:
-    """Return what contacts do in small vibrations, in words, from `ModelFacts.contacts`; empty for a model without contacts."""
+    """Return the state of the contacts in small vibrations, in words, from `ModelFacts.contacts`; empty without contacts."""
     return _STATES.get(contacts or "", "")
 
 
@@ -227,7 +227,7 @@ def with_contacts(text: str, contacts: str | None) -> str:
 
 
 def states_that_differ(states: Mapping[str, str]) -> str:
-    """Return a sentence about analyses of one model that hold its contacts differently; empty if all do the same.
+    """Return a sentence on analyses of one model with different contact states; empty if all have the same.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class Wheel:
     def diagram(self, engine_order: int) -> int:
         """Return the wave number whose diagram holds the crossings of an engine order."""
         excited = excited_wave(engine_order, self.sectors)
-        # where nothing parts them, both directions have the same frequencies, and one diagram
+        # without a split, both directions have the same frequencies, and one diagram
         return excited if self.parted else min(excited, self.sectors - excited)
 
     def require(self, diameters: Sequence[int] | None, key: str) -> None:

@@ -26,7 +26,7 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Interference, lis
     sectors = int(facts["sectors"])
     found = Interference(**facts, waves=waves, margin_percent=asked.margin_percent)
     if not {w.wave_number for w in waves} >= set(Wheel(sectors, parted=False).numbers()):
-        return found, []  # the job ended without a solution
+        return found, []  # no solution
     met = interference(waves, sectors, asked, float(facts["speed_rpm"]) * RPM)
     return replace(found, pairs=_pairs(waves, met)), list(safe_doubts(met))
 

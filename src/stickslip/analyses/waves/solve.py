@@ -83,8 +83,8 @@ def wave_in_flow(
     return flutter_of_wave(moving, feedback, n_modes, ratios=ratios)
 
 
-FEW = 300  # dofs of a sector, of which all waves are solved in no time
-MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for
+FEW = 300  # dofs of a sector, up to which all waves are solved quickly
+MANY = 2000  # dofs of a sector, above which every wave has more modes than a study may request
 
 W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
 
@@ -276,16 +276,16 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
 
 
 def _growth(asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix) -> FloatArray:
-    """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
+    """Return the (m,) derivatives of ω² by Ω², from ``φᴴ (K + iωD − ω²M) φ = 0``; changes of φ are of second order."""
     x = asked.speeds[0] ** 2
     if x == 0 or not asked.model.rotates:
         return np.zeros(len(hertz))
-    # cyclic faces, joins and springs do not change with the speed: a mode feels what the parts do
+    # cyclic faces, joins and springs do not change with the speed, only the parts do
     by_x = _form(asked.stiffening, structure.expand(vectors))
     mass, omega = _form(structure.mass, vectors), 2 * np.pi * hertz
     if not asked.turning:
         return np.asarray((by_x / mass).real)
-    # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
+    # Coriolis terms grow with Ω; the real part of the damping dissipates, and does not count here
     turning = -_form(structure.damping, vectors).imag
     by_omega = 2 * omega * mass - turning
     return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)

@@ -19,7 +19,7 @@ from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import advance
 from stickslip.study.verdict import Verdict, doubt, to_json
 
-LEFT_OUT = 0.01  # of a frequency: so much harmonics that are not coupled may change it without a doubt
+LEFT_OUT = 0.01  # relative change of a frequency by harmonics that are not coupled, above which there is a doubt
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def unreached(assembly: Multistage) -> list[Verdict]:
 
 
 def _about(asked: StagesQuestion) -> dict[str, Any]:
-    """Return the note about the model; its sectors are those of the smallest wheel that is one with all stages."""
+    """Return the note about the model; its number of sectors is the least common multiple of the stages."""
     stages = asked.assembly.stages
     counts = [sector.sectors for sector in stages.values()]
     told = [f"{name} of {count} sectors" for name, count in zip(stages, counts, strict=True)]

@@ -39,14 +39,14 @@ from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, RPM, millimetres
 
 BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above which there is a warning
-APART = 0.1  # of the largest damping: energy method and eigenvalue differ by more
+APART = 0.1  # difference of energy method and eigenvalue over the largest damping, above which there is a doubt
 PERCENT = 100.0
 FLUTTERS = "The wheel flutters: friction may limit the vibration, more damping or another blade prevent it."
 MORE = "Add damping, or change the blade."
 MOST_ROWS = 40  # modes of a mistuned wheel on the screen
-LEAST = 5  # of them in a flow
-MOST_PAIRS = 30  # of an interference table on the screen
-NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
+LEAST = 5  # least damped modes of a mistuned wheel on the screen
+MOST_PAIRS = 30  # rows of an interference table on the screen
+NEARBY = 0.2  # largest margin at which the tangent of a frequency over speed justifies digits after the point
 
 
 WAVES = ("modes", "campbell", "flutter", "safe")  # tables of these analyses
@@ -82,7 +82,7 @@ def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple
 
 
 def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
-    """Doubt engine orders above the computed modes of their nodal diameters, and say how many modes are needed."""
+    """Doubt engine orders above the computed modes of their nodal diameters, and state the number of modes needed."""
     orders = found.not_judged
     if not orders:
         return ()
@@ -100,7 +100,7 @@ def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
 def campbell_doubts(
     unfollowed: Sequence[tuple[int, float]], unseen: Sequence[int], waves: Sequence[WaveBranches]
 ) -> tuple[Verdict, ...]:
-    """Doubt engine orders above the followed modes, and those that excite nodal diameters left out.
+    """Doubt engine orders above the followed modes, and engine orders that excite nodal diameters left out.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def in_ranges(numbers: Sequence[int] | set[int]) -> str:
 
 
 def _more(n_modes: int, ratio: float) -> int:
-    """Estimate how many modes reach `ratio` times as high: at most in proportion to frequency for blades."""
+    """Estimate the number of modes up to `ratio` times the highest frequency, in proportion to frequency as for blades."""
     return max(n_modes + 1, math.ceil(n_modes * min(ratio, 100.0)))
 
 

@@ -17,14 +17,14 @@ from stickslip.study.verdict import together
 
 _MOST_TOLD = 3  # crossings in the answer
 _DASHES = ("solid", "dot", "dashdot", "longdash")
-# a wave has its own, so that a print without colours can be read
+# each wave has its own symbol, for prints without colours
 _SYMBOLS = ("circle", "square", "diamond", "triangle-up", "x", "triangle-down", "star", "cross")
-_BESIDE = 0.25  # of the width: labels nearer than this side by side would touch on a narrow screen
-_BAND = 0.02  # half the height of a label, and its distance from the line, as a share of the picture's height
+_BESIDE = 0.25  # share of the width, below which labels side by side would touch on a narrow screen
+_BAND = 0.02  # half the height of a label, and its distance from the line, over the height of the figure
 
 
 def _bundles(hz: FloatArray, top: float) -> IntArray:
-    """Return for each line (wave, mode) the first wave whose line of the same mode it coincides with at all speeds, within a label's half height."""
+    """Return for each line (wave, mode) the first wave whose line of the same mode coincides with it, within `_BAND`."""
     first = np.tile(np.arange(hz.shape[0])[:, None], (1, hz.shape[2]))
     for w, mode in np.ndindex(*first.shape):
         for other in range(w):
@@ -42,9 +42,10 @@ def _bundled(view: Waves[Campbell], waves: Sequence[int]) -> str:
 
 
 def _label_places(hz: FloatArray, top: float, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the label position of each line (wave, mode): index of the speed, and 1 above or -1 below; side 0 for a line without a label.
+    """Return the label position of each line (wave, mode): index of the speed, and side (1 above, -1 below, 0 no label).
 
-    It is the first speed at which neither another line nor another label is in the way. Lines that coincide share the label of the `first`.
+    The label stands at the first speed without another line or label in the way. Lines that coincide share the label of
+    the `first`.
     """
     speed, side = (np.zeros((hz.shape[0], hz.shape[2]), dtype=np.int64) for _ in range(2))
     side[first == np.arange(len(hz))[:, None]] = 1
@@ -85,7 +86,7 @@ def _branches(view: Waves[Campbell]) -> list[go.Scatter]:
             text=[texts.get((w, mode), "") if s == at[w, mode] else "" for s in range(len(rpm))],
             textposition=f"{'top' if side[w, mode] >= 0 else 'bottom'} {'center' if at[w, mode] else 'right'}",
             textfont={"size": 10, "color": colour},
-            # beyond eight waves colours come again, dashed
+            # beyond eight waves colours repeat with dashed lines
             line={"color": colour, "width": 1.8, "dash": _DASHES[(w // 8) % len(_DASHES)]},
             marker={"size": 6, "symbol": _SYMBOLS[w % len(_SYMBOLS)]},
             hovertemplate=f"{name}, mode {mode + 1}: %{{y:.6g}} Hz at %{{x:.5g}} rpm<extra></extra>",

@@ -107,7 +107,7 @@ def frequencies(view: Waves[Modes]) -> list[Table]:
     """Return a table of the natural frequencies: one row a wave, one column a mode."""
     hz = hertz(view.found)
     head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
-    # where nothing parts the directions, both have the frequencies
+    # without a split, both directions have the same frequencies
     kinds = [w.kind if view.both or w.kind == "standing" else "both ways" for w in view.found.waves]
     names = [f"{name}, {kind}" if view.sectors > 1 else name for name, kind in zip(view.waves, kinds, strict=True)]
     rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]

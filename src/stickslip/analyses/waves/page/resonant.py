@@ -1,4 +1,4 @@
-"""The mode on which the figure of mode shapes opens: the one that an engine order excites nearest to the speed."""
+"""The mode on which the figure of mode shapes opens: an engine order excites it nearest to the speed."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ WAVE, MODE = "resonant_wave", "resonant_mode"  # indices of the mode on which th
 
 @dataclass(frozen=True)
 class _Met:
-    """A mode that an engine order excites, and the distance from the speed."""
+    """A mode that an engine order excites, and the distance of this resonance from the speed."""
 
     wave: Wave
     mode: int
@@ -23,14 +23,15 @@ class _Met:
 
 
 def with_resonance(modes: xr.Dataset, tree: xr.DataTree) -> xr.Dataset:
-    """Return the dataset of modes with the mode of each case that SAFE or Campbell diagram find nearest to a resonance.
+    """Return the dataset of modes with the mode of each case nearest to a resonance, by SAFE or Campbell diagram.
 
     Parameters
     ----------
     modes
         Dataset of the analysis ``modes``.
     tree
-        The result. The SAFE diagram goes before the Campbell diagram, whose crossings count from the speed of the modes.
+        The result. The SAFE diagram takes precedence over the Campbell diagram, whose crossings are compared with the
+        speed of the modes.
     """
     n = modes.sizes["case"]
     own = {name: tree[name].to_dataset() for name in ("safe", "campbell") if name in tree.children}

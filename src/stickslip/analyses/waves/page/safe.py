@@ -1,4 +1,4 @@
-"""The SAFE diagram: which modes engine orders can excite at a speed."""
+"""The SAFE diagram: modes that engine orders can excite at a speed."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def zigzag(highest_hz: float, sectors: int, hertz: float) -> tuple[FloatArray, F
     """
     last = highest_hz / hertz
     orders = np.append(np.arange(0.0, last, sectors / 2), last)
-    # folds at the greatest diameter, which for an odd number of sectors lies between two whole ones
+    # the line folds at the diameter n/2, which for an odd number of sectors n is no whole number
     folded = np.abs(orders - sectors * np.round(orders / sectors))
     return folded, orders * hertz
 
@@ -178,7 +178,7 @@ def _cards(view: Waves[Interference]) -> list[Card]:
 
 
 def _met(view: Waves[Interference], pair: Pair) -> str:
-    """Return which order meets which mode, and how far from the speed."""
+    """Name an engine order, the mode that it meets, and the margin to the speed."""
     return f"EO {pair.engine_order} meets {view.waves[pair.wave]}, mode {pair.mode + 1} ({_signed(pair.margin)})"
 
 
@@ -187,7 +187,7 @@ def _signed(margin: float) -> str:
 
 
 def _nearest(view: Waves[Interference]) -> str:
-    """Return the pair with the least margin; empty for none that meets."""
+    """Describe the pair with the least margin; empty if no pair meets."""
     found = [pair for pair in view.found.pairs if np.isfinite(pair.margin)]
     least = min(found, key=lambda pair: abs(pair.margin), default=None)
     if least is None:

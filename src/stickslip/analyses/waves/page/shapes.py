@@ -1,7 +1,7 @@
 """Mode shapes that turn in the page: one sector or the wheel, at any phase, coloured by displacement.
 
-The page holds the complex shapes of one sector on a coarse skin, whose points are points of the fine one; the script of ``assets/shapes.js``
-expands them to the wheel.
+The page holds the complex shapes of one sector on a coarse skin, whose points belong to the fine one. The script
+``assets/shapes.js`` expands them to the wheel.
 """
 
 import base64
@@ -21,9 +21,9 @@ from stickslip.model.mesh.coarse import coarse_skin
 from stickslip.report.plot import FONT, MUTED, Plot, styled
 from stickslip.report.quantities import counted
 
-_SHAPE_BYTES = 600_000  # of all shapes of a page together, before they become text
+_SHAPE_BYTES = 600_000  # all shapes of a page, before they become text
 _POINT_BYTES = 12  # x, y, z, real and imaginary, 16 bits each
-_WHEEL_POINTS = 26_000  # of the whole wheel, so that it turns and moves without waiting
+_WHEEL_POINTS = 26_000  # points of the whole wheel, so that it turns and moves without delay
 _FEWEST_POINTS = 250
 _FULL = 32767  # largest 16-bit number
 _MM = 1e3

@@ -60,7 +60,7 @@ class Waves(Node, Generic[T]):
 
 
 def states(nodes: Mapping[str, Node]) -> Words | None:
-    """Return the sentence that analyses hold the contacts differently; None where all do the same.
+    """Return the sentence on analyses with different contact states; None if all have the same.
 
     Parameters
     ----------
