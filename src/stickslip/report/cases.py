@@ -46,12 +46,12 @@ class ShownCase:
 
     @property
     def identity(self) -> frozenset[str]:
-        """What tells the same case in another result: varied keys with their values; the name where nothing is varied."""
+        """Identity of the case in other results: varied keys with their values, or the name if nothing is varied."""
         return frozenset(self.assigned or (self.label,))
 
     @property
     def where(self) -> str:
-        """The end of a sentence about this case: `` with NAME``, or nothing."""
+        """The end of a sentence about this case: `` with NAME``, or an empty text."""
         return f" with {self.label}" if self.label else ""
 
     @property

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stickslip.report.cases import ShownCase
 
-# In all texts **words** are set bold, `names` as code, and a line break is kept.
+# all texts may contain **bold** words, `names` as code, and line breaks
 
 
 @dataclass(frozen=True)

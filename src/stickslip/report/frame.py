@@ -26,10 +26,10 @@ _CONFIG = {
     "responsive": True,
     "displaylogo": False,
     "modeBarButtonsToRemove": ["select2d", "lasso2d"],
-    # the camera saves pictures for print: twice the size on the screen
+    # pictures are saved for print, at twice the size on the screen
     "toImageButtonOptions": {"scale": 2},
 }
-PLURAL = ("note", "warning")  # words of verdicts that are counted; the others are levels
+PLURAL = ("note", "warning")  # words of verdicts with a plural; the others are levels
 _BOLD, _CODE = re.compile(r"\*\*(.+?)\*\*"), re.compile(r"`([^`]+)`")
 
 
@@ -38,7 +38,7 @@ Kind = Literal["figure", "table", "words", "chooser"]
 
 @dataclass(frozen=True)
 class Placed:
-    """One element of the page. A figure has a number, a drawing, and a mark whether it scrolls on a narrow screen."""
+    """One element of the page. A figure has a number, a drawing, and a flag to scroll on a narrow screen."""
 
     own: Content
     kind: Kind
@@ -69,7 +69,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Cause:
-    """Verdicts of one kind: the first in full, and the others where they are asked for."""
+    """Verdicts of one kind: the first in full, the others on request."""
 
     verdict: Verdict
     others: Sequence[Verdict] = ()
@@ -95,7 +95,7 @@ class Conclusion:
     causes
         Verdicts with a doubt, a warning or a remedy.
     good
-        Trusted answers with what was examined.
+        Trusted answers with their checks.
     """
 
     told: str
@@ -107,7 +107,7 @@ class Conclusion:
 
 @dataclass
 class Placing:
-    """Numbers the figures of a page in their order."""
+    """Numbering of the figures of a page, in their order."""
 
     figures: int = field(default=0)
 

@@ -52,7 +52,7 @@ _AXIS = {
     "exponentformat": "power",
     "title": {"standoff": 8, "font": {"size": 14}},
 }
-# one template, checked once: ten times as fast as the same for every axis of every figure
+# one template, validated once: ten times as fast as the same settings for every axis of every figure
 _TEMPLATE = go.layout.Template(layout={**_LAYOUT, "xaxis": _AXIS, "yaxis": _AXIS})
 _ROW_ABOVE = {"orientation": "h", "x": 0, "xanchor": "left", "yref": "container", "y": 0.995, "yanchor": "top"}
 
@@ -92,13 +92,13 @@ class Plot:
     folded: str = ""
 
     def __post_init__(self) -> None:
-        """Hide the traces that belong to other cases, for a reader without scripts and for the first view."""
+        """Hide the traces of other cases, for a reader without scripts and for the first view."""
         for trace in self.figure.data if self.case_captions else ():
             trace.visible = trace.meta is None or trace.meta == self.chosen
 
 
 def colour(index: int) -> str:
-    """Return the CSS colour of the line number `index`."""
+    """Return the CSS colour of a line by its number."""
     return COLOURS[index % len(COLOURS)]
 
 
@@ -122,7 +122,7 @@ def ring(colour: object, size: float, width: float = 1.4) -> dict[str, object]:
 
 
 def log_ticks(values: FloatArray) -> dict[str, object]:
-    """Ticks of a logarithmic axis over the positive `values`, written as plain numbers."""
+    """Return the ticks of a logarithmic axis over the positive `values`, written as plain numbers."""
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return {}
@@ -144,7 +144,7 @@ def _even_ticks(low: float, high: float) -> list[float]:
 
 
 def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figure:
-    """Give `figure` the look of the page; returns it."""
+    """Give `figure` the look of the page; return it."""
     margin = {"l": 70, "r": 20, "t": 56 if figure.layout.annotations else 40, "b": 55}
     figure.update_layout(template=_TEMPLATE, height=height, margin=margin, legend_title_text=legend_title)
     figure.update_annotations(font_size=13)

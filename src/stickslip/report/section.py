@@ -10,8 +10,8 @@ from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 
 Content = Plot | Table | Words | Chooser
-Shown = Content | Sequence[Content] | None  # None where the dataset does not hold what is shown
-Part = Callable[[Any], Shown]  # of a view of the dataset
+Shown = Content | Sequence[Content] | None  # None if the dataset lacks the variables
+Part = Callable[[Any], Shown]  # takes a view of the dataset
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Section:
     answer
         Parts that draw the answer: the first figure among them stands at the top of the page. Empty: the first figure of the section.
     yields_to
-        Analyses whose answer and figure stand at the top instead, where the result has one of them.
+        Analyses whose answer and figure stand at the top instead, if the result has one of them.
     """
 
     name: str

@@ -7,13 +7,13 @@ from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from stickslip.arrays import FloatArray, IntArray
 
-_CORNERS = 12  # of a patch that nothing cuts
+_CORNERS = 12  # corners of an uncut patch
 _NEAREST = 12  # neighbours that may cut a patch
-_REACH = 1.5  # radius of an uncut patch over that of a circle of its area: corners of a square reach 1.25
+_REACH = 1.5  # radius of an uncut patch over the radius of a circle of its area; corners of a square reach 1.25
 _WITHIN = 6.0  # the same within the rim of a flat face, whose nodes share its area unevenly
-_FLAT = 0.95  # cosine of normals from which a face is flat
+_FLAT = 0.95  # least cosine between the normals of a flat face
 _CORNERS_OF_LINE = 2
-_BEHIND = 0.2  # cosine of normals below which a neighbour is of another face
+_BEHIND = 0.2  # cosine between normals, below which a neighbour belongs to another face
 
 
 def patches(position: FloatArray, frame: FloatArray, area: FloatArray, members: Sequence[int]) -> dict[int, FloatArray]:

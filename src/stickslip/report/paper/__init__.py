@@ -1,1 +1,1 @@
-"""Figures of the page drawn for print, by matplotlib, which is imported only when one is drawn."""
+"""Figures of the page for print, drawn by matplotlib, which is imported only when needed."""

@@ -11,8 +11,8 @@ from stickslip.report.paper.panels import Place, arranged, places, set_axes
 from stickslip.report.paper.texts import fit_texts, name_alone
 from stickslip.report.paper.traces import Panel, draw_trace, unknown_kinds
 
-MAX_COLUMNS = 8  # of a legend
-LINES_OF_A_CASE = 3  # entries of a group that are named by it, each
+MAX_COLUMNS = 8  # columns of a legend
+LINES_OF_A_CASE = 3  # largest number of entries of a group that each carry its name
 SOLID = ("scatter3d", "mesh3d", "surface", "cone")
 
 
@@ -41,12 +41,12 @@ def draw(figure: go.Figure, name: str, ax: Any = None, width: float | None = Non
     ax
         Axes to draw in: one for a figure with a single panel, else one a panel in the order of reading. None: a new figure.
     width
-        Width of a new figure in inches; None: that of ``rcParams["figure.figsize"]``.
+        Width of a new figure in inches; None: the width in ``rcParams["figure.figsize"]``.
 
     Raises
     ------
     InputError
-        If the figure is a solid, or the number of axes is not that of the panels.
+        If the figure is a solid, or there are not as many axes as panels.
     StickslipError
         If matplotlib is not installed.
     """
@@ -131,7 +131,7 @@ def _drawn(figure: go.Figure, place: Place, axes: Any) -> Panel:
 
 
 def _legend(figure: go.Figure, panels: Sequence[Panel]) -> tuple[list[Any], list[str], str]:
-    """Return artists and texts of the legend, each once, and its title: those of the groups, if groups are large."""
+    """Return artists and texts of the legend, each once, and its title: the names of the groups, if groups are large."""
     groups: dict[str, dict[str, Any]] = {}
     for panel in panels:
         for artist, text, group in panel.handles:

@@ -16,7 +16,7 @@ INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72.27}
 LEAST_WIDTH, MOST_WIDTH = 20 / 25.4, 1000 / 25.4  # inches
 FORMATS = ("pdf", "svg", "eps", "png")
 _LENGTH = re.compile(r"\s*([0-9.]+)\s*([a-z]+)\s*")
-# what a column of a journal asks for; a style of the user's own is set on top
+# settings for a column of a journal; the user's style is applied after them
 STYLE: Any = {
     "font.size": 8,
     "axes.titlesize": 8,
@@ -29,12 +29,12 @@ STYLE: Any = {
     "lines.linewidth": 1.2,
     "lines.markersize": 3.5,
     "legend.frameon": False,
-    "pdf.fonttype": 42,  # letters stay letters that an editor can change
+    "pdf.fonttype": 42,  # text stays editable
     "ps.fonttype": 42,
     "svg.fonttype": "none",
     "svg.hashsalt": "stickslip",  # the same file from the same result
 }
-# none has the date of its making: the same result gives the same bytes
+# files hold no date, so that the same result gives the same bytes
 _NO_DATE = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
@@ -44,7 +44,7 @@ def inches(length: str) -> float:
     Raises
     ------
     InputError
-        If it is no length, or no width of a figure.
+        If the text is no length, or the length no possible width of a figure.
     """
     found = _LENGTH.fullmatch(length)
     try:

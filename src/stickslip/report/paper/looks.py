@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.report.plot import COLOURS
 
-PLOTLY_LINE = 2.0  # px, the width of a line that a trace leaves open
-PLOTLY_MARKER = 6.0  # px, its size of a marker
+PLOTLY_LINE = 2.0  # default width of a line in plotly, px
+PLOTLY_MARKER = 6.0  # default size of a marker in plotly, px
 _DASHES = {"dash": "--", "dot": ":", "dashdot": "-.", "longdash": (0, (8, 3)), "longdashdot": (0, (8, 3, 1, 3))}
 _MARKERS = {
     "circle": "o",
@@ -62,21 +62,21 @@ def shade(colour: Any, opacity: float | None = None, default: str = COLOURS[0]) 
 
 
 def dash(style: str | None) -> Any:
-    """Return the line style of matplotlib for one of plotly; solid for none, and a list of lengths as such."""
+    """Return the line style of matplotlib for a style of plotly: a name, a list of lengths, or none for solid."""
     if style and style[0].isdigit():
         return (0, tuple(float(v) for v in re.findall(r"[\d.]+", style)))
     return _DASHES.get(style or "", "-")
 
 
 def symbol(name: str | None) -> tuple[str, bool]:
-    """Return the marker of matplotlib for one of plotly, and whether it is open."""
+    """Return the marker of matplotlib for a symbol of plotly, and whether it is open."""
     given = name or "circle"
     own = given.removesuffix("-dot").removesuffix("-open")
     return _MARKERS.get(own, "o"), "-open" in given and not own.endswith("-thin")
 
 
 def colour_map(scale: Sequence[Sequence[Any]] | None) -> Any:
-    """Return a colour scale of plotly, pairs of a place and a colour, as a colour map; equal places are a step."""
+    """Return a colour scale of plotly, pairs of position and colour, as a colour map; equal positions are a step."""
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -96,14 +96,14 @@ def values_of(given: Any) -> np.ndarray:
 
 
 def line_width(width: float | None) -> float:
-    """Return the width of a line in points: that of `rcParams`, as the page has it to its own lines."""
+    """Return the width of a line in points: the width in `rcParams`, scaled by the ratio to plotly's default."""
     from matplotlib import rcParams
 
     return float(rcParams["lines.linewidth"]) * (1.0 if width is None else float(width) / PLOTLY_LINE)
 
 
 def marker_size(size: float | None) -> float:
-    """Return the size of a marker in points: two thirds of `rcParams` where the page has its usual size."""
+    """Return the size of a marker in points: two thirds of `rcParams`, scaled by the ratio to plotly's default."""
     from matplotlib import rcParams
 
     return float(rcParams["lines.markersize"]) * (1.0 if size is None else float(size) / PLOTLY_MARKER) / 1.5

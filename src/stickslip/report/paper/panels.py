@@ -9,12 +9,12 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.report.paper.looks import dash, line_width, shade, values_of, worded
 
-LEAST_WIDTH = 1.45  # inches of a panel with its labels
+LEAST_WIDTH = 1.45  # least width of a panel with its labels, inches
 PAGE_WIDTH = 900.0  # px of a figure on the page
 PAGE_ROOM = 95.0  # px above and below its panels
 LEAST_ASPECT, MOST_ASPECT = 0.4, 0.8  # height of a panel over its width
-UPRIGHT = 1.5  # panels on paper are so much higher than on a wide screen
-_COINCIDENT = 1e-6  # of the figure: places closer than this are one
+UPRIGHT = 1.5  # aspect of panels on paper over their aspect on a wide screen
+_COINCIDENT = 1e-6  # share of the figure; closer places coincide
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def arranged(found: Sequence[Place], wide: float, page_height: float | None) -> 
 
 
 def _tracks(ranges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the shortest range at each begin; longer ones span several."""
+    """Return the ranges of single rows or columns; longer ranges span several of them."""
     found: list[tuple[float, float]] = []
     for low, high in sorted(ranges):
         if not found or low >= found[-1][1] - _COINCIDENT:
@@ -212,7 +212,7 @@ def _set_polar(axes: Any, own: Any) -> None:
 
 
 def _set_notes(axes: Any, place: Place, layout: Any) -> None:
-    """Set the notes of a panel; one above the panel, in the figure's own coordinates, is its title."""
+    """Set the notes of a panel; a note above it, in coordinates of the figure, is its title."""
     for note in layout.annotations:
         if not note.text or note.visible is False:
             continue
@@ -251,7 +251,7 @@ def _annotate(axes: Any, note: Any) -> None:
 
 
 def _set_mark(axes: Any, place: Place, mark: Any) -> None:
-    """Draw a line or a rectangle that lies in this panel; its ends may be shares of the panel."""
+    """Draw a line or a rectangle in this panel; its ends may be shares of the panel."""
     x_ref, y_ref = (mark.xref or "x").split(), (mark.yref or "y").split()
     if x_ref[0] not in (place.x, "paper") or y_ref[0] not in (place.y, "paper") or x_ref[0] == y_ref[0] == "paper":
         return

@@ -1,4 +1,4 @@
-"""Texts of a panel that fit on it: titles in lines, ticks that do not overlap, names that a neighbour had for both."""
+"""Texts that fit on a panel: titles in lines, ticks that do not overlap, axis names shared with a neighbour."""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -12,13 +12,13 @@ from stickslip.report.paper.panels import Place
 LETTER = 0.55  # mean width of a letter over the size of its font
 LINE = 1.3  # height of a line over the size of its font
 BESIDE, BELOW = 0.65, 0.45  # inches of a panel for tick labels and titles
-LEAST = 0.5  # share of a panel that its axes take at least
-SMALLEST = 4.0  # points of a tick label
+LEAST = 0.5  # least share of a panel for its axes
+SMALLEST = 4.0  # least size of a tick label, points
 INCH = 72.0  # points
 
 
 def name_alone(axes: Any, place: Place, layout: Any, others: Sequence[Place]) -> None:
-    """Give axes the titles and tick labels that a panel of the same row or column had for all."""
+    """Give axes their own tick labels and titles, which the page shows once for a row or column of panels."""
     if place.polar:
         return
     for axis, direction, same in ((axes.xaxis, "x", "across"), (axes.yaxis, "y", "up")):
@@ -74,7 +74,7 @@ def _size(axis: Any) -> float:
 
 
 def _turn_names(axis: Any, room: float) -> None:
-    """Turn the names of bars upright where they would overlap."""
+    """Turn the names of bars upright if they would overlap."""
     from matplotlib.category import StrCategoryFormatter
 
     if not isinstance(axis.get_major_formatter(), StrCategoryFormatter):
@@ -87,7 +87,7 @@ def _turn_names(axis: Any, room: float) -> None:
 
 
 def _shrink_names(axis: Any, room: float) -> None:
-    """Make the names of rows smaller where their lines would overlap."""
+    """Make the names of rows smaller if their lines would overlap."""
     from matplotlib.ticker import FixedLocator
 
     if axis.get_scale() != "log" and isinstance(axis.get_major_locator(), FixedLocator):

@@ -37,11 +37,11 @@ class Panel:
     handles
         Entries of the legend so far: artist, text and group.
     last
-        Coordinates of the last line, which an area may reach down to.
+        Coordinates of the last line, the possible lower edge of an area.
     stacked
         Height of the bars so far, by place and sign.
     mappable
-        What the colour bar belongs to; None without a bar.
+        Artist of the colour bar; None without a bar.
     bar_title
         Title of the colour bar.
     """
@@ -62,7 +62,7 @@ def unknown_kinds(traces: Any) -> list[str]:
 
 
 def draw_trace(panel: Panel, trace: Any) -> None:
-    """Draw one trace; what is hidden is left out."""
+    """Draw one trace, unless it is hidden."""
     if trace.visible in (False, "legendonly"):
         return
     artist = _DRAWN[trace.type](panel, trace)
@@ -79,7 +79,7 @@ def _polar(panel: Panel, trace: Any) -> Any:
 
 
 def _curve(panel: Panel, trace: Any, x: Any, y: Any) -> Any:
-    """Draw line, area, error bars, markers and texts of a trace; return what the legend shows."""
+    """Draw line, area, error bars, markers and texts of a trace; return the artist for the legend."""
     n = min(len(x), len(y))
     x, y = x[:n], y[:n]
     mode = trace.mode or ("lines+markers" if n < 20 else "lines")
@@ -269,7 +269,7 @@ def _joined(given: Any) -> Any:
 
 
 def _bar_places(panel: Panel, trace: Any, places: Any, *, stacks: bool) -> tuple[float, Any]:
-    """Return the width of bars and their places, side by side with those of the other traces of the panel."""
+    """Return the width of bars and their places, side by side with the bars of other traces in the panel."""
     if isinstance(trace.width, int | float):
         return float(trace.width), places
     if places.dtype.kind != "f":
