@@ -14,7 +14,7 @@ from stickslip.model.damping import Damping
 from stickslip.model.part import Part
 from stickslip.units import HZ, RPM, quantity_of
 
-MANY = 20  # numbers of a list, above which its ends are told
+MANY = 20  # numbers of a list, above which only its ends are shown
 
 
 def as_tables(model: Model, name: str, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def as_tables(model: Model, name: str, keys: Mapping[str, Any]) -> dict[str, Any
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON and TOML hold it; long lists are shortened to their ends."""
+    """Return a value in the types of JSON and TOML; long lists are shortened to their ends."""
     if isinstance(value, str | int | float | None):
         return value
     found = np.asarray(value, dtype=object if isinstance(value, list | tuple) else None).tolist()

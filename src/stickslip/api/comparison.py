@@ -23,8 +23,8 @@ from stickslip.report.result import RESULT
 from stickslip.study.store.folder import JOBS
 
 Compared = str | Path | Result
-STUDY = "study.toml"  # in the folder of a study
-_FOLDER = "results"  # of a study that names no other
+STUDY = "study.toml"  # file name in the folder of a study
+_FOLDER = "results"  # default folder of the results
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Comparison:
     Parameters
     ----------
     designs
-        In the order given; the first is the reference of the others.
+        Designs in the order given; the first is the reference of the others.
     curves
         Responses of measurements or of other programs.
     """
@@ -66,7 +66,7 @@ class Comparison:
 
     @property
     def peaks(self) -> pd.DataFrame:
-        """One row a case and design: the peak and its difference from the first design; NaN if that lacks the case."""
+        """One row a case and design: the peak, and its difference from the first design (NaN if it lacks the case)."""
         divided = per_force(self.designs, self.curves)
         found = peak_rows(self.designs, divided=divided)
         if not found:
@@ -90,7 +90,7 @@ class Comparison:
         return pd.DataFrame({n: np.array(own) for n, own in zip(head, columns, strict=True)})
 
     def peaks_in_words(self) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
-        """Return head and cells of the peaks in a unit that suits them, as on the page."""
+        """Return headings and cells of the table of peaks, with units as on the page."""
         found = peaks(self.designs, divided=per_force(self.designs, self.curves))
         return ((), ()) if found is None else (found.head, found.rows)
 
@@ -153,7 +153,7 @@ def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:
 
 
 def _all_opened(compared: Sequence[Compared]) -> list[Result | MeasuredCurve]:
-    """Return what is compared; one error names all that cannot be read."""
+    """Return the results and curves to compare; one error names all that cannot be read."""
     given: list[Result | MeasuredCurve] = []
     errors: list[InputError] = []
     for own in compared:

@@ -22,7 +22,7 @@ def plotted(figures: Mapping[str, go.Figure], name: str, ax: Any, backend: Backe
     name, ax, backend, case
         As in `Result.plot`.
     of
-        What the figures belong to, for errors.
+        Name of the owner of the figures, for errors.
     """
     if name not in figures:
         raise input_error(f"plot({name!r})", f"is no figure of this {of}", did_you_mean(name, list(figures)))

@@ -45,7 +45,7 @@ from stickslip.study.questions import ANALYSES
 from stickslip.study.run import answer
 from stickslip.units import RPM
 
-OF_THE_MODEL = ("alert_over",)  # keys of tables that a model has itself
+OF_THE_MODEL = ("alert_over",)  # keys of tables that are fields of a model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -275,7 +275,7 @@ def _with_keys(name: str) -> Signature:
 
 
 def _method(name: str) -> Callable[..., Result]:
-    """Return the method of an analysis that has none of its own."""
+    """Return a method for an analysis that `Model` does not define."""
 
     def ask(self: Model, *, folder: str | Path | None = None, **keys: Any) -> Result:
         return self._answer(name, keys, folder)
@@ -296,7 +296,7 @@ def _frequencies(hz: object) -> list[float]:
     if isinstance(hz, int | float):
         raise input_error("forced_response: hz", f"is one number, {hz:g}", example)
     try:
-        return [float(f) for f in hz]  # type: ignore[attr-defined]  # tried
+        return [float(f) for f in hz]  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         raise input_error("forced_response: hz", f"is {hz!r}, which holds no numbers", example) from None
 

@@ -16,13 +16,13 @@ from rich.text import Text
 from stickslip.errors import printable
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
-_DECIMALS = 5  # of cells that are printed as they are
-_DIGITS = 5  # of the largest number of a column
-PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
+_DECIMALS = 5  # most decimals of cells that are printed unchanged
+_DIGITS = 5  # digits of the largest number of a column
+PLAIN_WIDTH = 130  # characters of a line without a terminal
 
 
 def console() -> Console:
-    """Return the console; its lines are wide where the output goes to a file."""
+    """Return the console; its lines are wide if the output goes to a file."""
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
@@ -90,9 +90,9 @@ def say_answers(verdicts: Sequence[str], failed: int, files: Sequence[Path], las
     say(f"\n{last}")
 
 
-TRACEBACK = "STICKSLIP_TRACEBACK"  # the environment variable that asks for one
+TRACEBACK = "STICKSLIP_TRACEBACK"  # environment variable that requests a traceback
 FAILED = 1  # exit code
-_LONGEST = 300  # characters of what a library says
+_LONGEST = 300  # characters of the message of a library
 _NO_MEMORY = ("cannot allocate", "failed to map segment", "out of memory", "can't start new thread")
 
 
@@ -105,9 +105,9 @@ def output_that_may_fail() -> Iterator[None]:
     SystemExit
         At the end of the command, and if the output cannot be written.
     """
-    if sys.stdout is None:  # closed: the first file that is opened would get its number
+    if sys.stdout is None:  # closed: the next opened file would get its descriptor
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115
-    with suppress(AttributeError):  # not what was put in its place
+    with suppress(AttributeError):  # a replacement of stdout may lack the method
         sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         try:
@@ -116,7 +116,7 @@ def output_that_may_fail() -> Iterator[None]:
             sys.stdout.flush()
     except OSError as error:
         with suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left goes there
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discards buffered output
         with suppress(OSError, AttributeError):
             sys.stderr.write(f"standard output: cannot be written ({error.strerror}).\n")
         raise SystemExit(FAILED) from None
@@ -150,7 +150,7 @@ def unforeseen(error: BaseException) -> str:
 
 
 def _lacks_memory(error: BaseException | None) -> bool:
-    """Return whether memory was short; libraries that cannot be loaded report it in words, or behind other errors."""
+    """Return whether memory was short; some libraries report it in words, or as the cause of other errors."""
     while error is not None:
         words = str(error).lower()
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:

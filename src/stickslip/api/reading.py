@@ -16,7 +16,7 @@ def read(path: Path, tell: Callable[[str], None] | None = None, *, allow_code: b
     path
         The study file.
     tell
-        What is given the line on size and time of a check, before heavy libraries are imported.
+        Function that takes the line on size and time of a check, before heavy libraries are imported.
     allow_code
         Whether the file may name modules of the user.
 

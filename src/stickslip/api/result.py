@@ -26,7 +26,7 @@ from stickslip.study.outcome import Outcome
 from stickslip.study.store.netcdf import write_tree
 from stickslip.study.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
 
-WITH_PEAKS = ("forced_response", "modes", "safe")  # analyses of which `Result.peaks` is a table
+WITH_PEAKS = ("forced_response", "modes", "safe")  # analyses for which `Result.peaks` has a table
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +262,7 @@ class Result:
 
     @property
     def conclusion(self) -> str:
-        """The last line of a run: `not_trusted`, or the statement that every answer is trusted, with the number of single points that are not."""
+        """The last line of a run: `not_trusted`, or that every answer is trusted, with the number of doubtful points."""
         return conclusion(self.data)
 
     def __repr__(self) -> str:

@@ -18,9 +18,9 @@ from stickslip.errors import printable
 from stickslip.study.store.progress import DONE, head
 
 LOG = logging.getLogger("stickslip")
-STEPS = 10  # plain lines that a job writes on its way
-QUIET = 30.0  # seconds without a line, after which running jobs say where they are
-FULL = "━" * 10  # the bar of a job that is done
+STEPS = 10  # plain lines of the progress of a job
+QUIET = 30.0  # seconds without a line, after which the progress of running jobs is printed
+FULL = "━" * 10  # the bar of a finished job
 _BETWEEN = 0.2  # seconds between two drawings
 _WIDTH = 24  # characters of a bar
 
@@ -32,7 +32,7 @@ def in_notebook() -> bool:
 
 
 class NotebookScreen(logging.Handler):
-    """Draws progress records as bars in one output, with warnings below; ignores all other lines.
+    """Log handler that draws progress records as bars in one output, with warnings below; ignores all other lines.
 
     Parameters
     ----------
@@ -97,14 +97,14 @@ class NotebookScreen(logging.Handler):
 
 @dataclass
 class At:
-    """Where a job is.
+    """Progress of a job.
 
     Parameters
     ----------
     begun
         Time of its first record.
     fraction
-        Finished share.
+        Finished fraction.
     text
         Stage and point, in words.
     task
@@ -118,9 +118,9 @@ class At:
 
 
 class Screen(logging.Handler):
-    """Draws a bar for each running job and one line for each finished job; prints lines that belong to no job.
+    """Log handler that draws a bar for each running job, and prints a line for each finished job and lines of no job.
 
-    Without a terminal it prints where each running job is when it has written nothing for `QUIET` seconds.
+    Without a terminal it prints the progress of each running job after `QUIET` seconds without a line.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Screen(logging.Handler):
     verbose
         Whether to print the messages of running jobs too, as the log file does.
     quiet
-        Seconds without a line, after which running jobs say where they are.
+        Seconds without a line, after which the progress of running jobs is printed.
     """
 
     def __init__(
@@ -192,9 +192,9 @@ class Screen(logging.Handler):
             self._line(text)
 
     def _watch(self, over: threading.Event) -> None:
-        """Say where the running jobs are whenever nothing has been written for a while."""
+        """Print the progress of the running jobs whenever nothing has been written for a while."""
         while not over.wait(max(self._wrote + self._quiet - monotonic(), 0.01)):
-            with self.lock or nullcontext(), suppress(OSError):  # a closed pipe, of which the next line tells
+            with self.lock or nullcontext(), suppress(OSError):  # a closed pipe; the next line reports it
                 if monotonic() - self._wrote >= self._quiet:
                     self._wrote = monotonic()
                     for job, at in self._at.items():
@@ -208,7 +208,7 @@ class Screen(logging.Handler):
         if text == DONE:
             self._done(job)
             return
-        if job and job not in self._at:  # the model is built
+        if job and job not in self._at:  # the model is complete
             self._forget("")
         at = self._at.setdefault(job, At(monotonic() if job else self._begun))
         at.fraction, at.text = max(at.fraction, fraction or 0.0), "" if text == job else text
@@ -221,9 +221,11 @@ class Screen(logging.Handler):
         """Move the bar of a job."""
         assert self._progress is not None
         if at.task is None:
-            while sum(one.task is not None for one in self._at.values()) >= self._bars:  # of workers that were lost
+            while (
+                sum(one.task is not None for one in self._at.values()) >= self._bars
+            ):  # remove the bars of lost workers
                 self._forget(next(name for name, one in self._at.items() if one.task is not None))
-            # without a job there is no share: the bar runs to and fro
+            # without a job the fraction is unknown: the bar runs to and fro
             at.task = self._progress.add_task(job or "model", total=1.0 if job else None, state="")
         self._progress.update(at.task, completed=at.fraction, state=printable(at.text))
 

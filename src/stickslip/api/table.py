@@ -29,12 +29,14 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-# what the rows of a table are of, the first that an analysis has, that with most dimensions
+# main variables, whose entries are the rows of a table; the first one that an analysis has counts
 _CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")
 
 
 def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
-    """Return a variable and those over its dimensions, one row an entry. Missing entries are left out; verdicts and states become words.
+    """Return a variable and all variables over its dimensions, one row an entry.
+
+    Missing entries are left out; verdicts and states become words.
 
     Parameters
     ----------
@@ -52,7 +54,9 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     """
     short = {
         str(data[c].attrs[VARIED_KEY]): str(c)
-        for c in sorted(data.coords, key=lambda c: -len(str(c)))  # that of the points last, without case_
+        for c in sorted(
+            data.coords, key=lambda c: -len(str(c))
+        )  # the shortest name last: the coordinate of points, without the prefix case_
         if VARIED_KEY in data[c].attrs
     }
     data = as_stored(data)
@@ -69,11 +73,11 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
     own = data[[chief, *(v for v in kept if v != chief)]]
     frame = own.to_dataframe()
-    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may be called as its dimension
+    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may have the name of its dimension
     frame = frame.reset_index(places).reset_index(drop=True)
     if frame[chief].dtype.kind == "f":
         there = np.isfinite(frame[chief])
-        if "status" in own and "frequency_hz" in own:  # a point without a solution has its frequency
+        if "status" in own and "frequency_hz" in own:  # a point without a solution still has a frequency
             there |= np.isfinite(frame["frequency_hz"])
         frame = frame[there].reset_index(drop=True)
     case = frame["case"].to_numpy() if "case" in dims else None
@@ -83,7 +87,7 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
         keys, values = varied_values(data)
         for k, key in reversed(list(enumerate(keys))):
             frame.insert(0, short.get(key, key), values[case, k])
-    for v in own.data_vars:  # numbers that stand for words
+    for v in own.data_vars:  # codes become words
         told = own[v].attrs
         if "flag_meanings" in told:
             words = dict(zip(np.ravel(told["flag_values"]).tolist(), str(told["flag_meanings"]).split(), strict=True))
