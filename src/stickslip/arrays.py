@@ -10,4 +10,4 @@ ComplexArray = npt.NDArray[np.complexfloating[Any, Any]]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 TextArray = npt.NDArray[np.str_]
-Matrix = Any  # dense ndarray or scipy.sparse.csr_array: scipy ships no types
+Matrix = Any  # dense ndarray or scipy.sparse.csr_array, for which scipy has no types

@@ -24,7 +24,7 @@ from stickslip.api.reading import read
 from stickslip.api.screen import Screen, on_screen
 from stickslip.errors import InputError, StickslipError, input_error
 
-FILES_TOLD = 4  # of an export
+FILES_TOLD = 4  # files of an export that are listed
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(

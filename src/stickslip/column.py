@@ -11,7 +11,7 @@ from typing import Any, get_args, get_type_hints
 
 @dataclass(frozen=True)
 class Column:
-    """How a field is stored in a result.
+    """Storage of a field in a result.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Rows:
-    """How a field with a tuple of records is stored: the records one after another along a dimension.
+    """Storage of a field with a tuple of records: one record after the other along a dimension.
 
     Parameters
     ----------
@@ -45,13 +45,13 @@ class Rows:
     prefix
         Prefix of the variable names.
     owner
-        Meaning of the variable ``prefix + dimension of the owner``, the index of the record that contains a row; empty if the rows belong
-        to the case itself.
+        Meaning of the variable ``prefix + dimension of the owner``: the index of the record that contains a row. Empty if
+        the rows belong to the case itself.
     always
         Whether a result without any records has the variables, of length zero.
     beside
-        Whether each owner has a row of the variables, along the dimension of the owners; shorter ones are padded. The first field of the
-        record is missing in the padding.
+        Whether the variables have a further dimension, that of their owners; shorter rows are padded. The padding is
+        known by the missing first field of the record.
     """
 
     dim: str
@@ -84,7 +84,7 @@ def rows_of(kind: type[Any]) -> dict[str, Rows]:
 
 
 def names_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
-    """Yield the names of the variables that a class of records is stored as, those of its rows included."""
+    """Yield the names of all variables of a class of records, rows included."""
     yield from (prefix + (c.name or name) for name, c in columns_of(kind).items())
     for name, inner in rows_of(kind).items():
         yield from names_of(get_args(get_type_hints(kind)[name])[0], inner.prefix)

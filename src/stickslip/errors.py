@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from string import Template
 
-# controls, marks of direction, and what is no character
+# control characters, marks of direction, and code points that are no characters
 _STEERING = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]")
 LONGEST_MESSAGE = 1900  # bytes
 LONGEST_TEXT = 600  # characters of a place, a problem or a remedy
@@ -39,7 +39,7 @@ class InputError(StickslipError):
         words: Mapping[str, str] | None = None,
         others: "tuple[InputError, ...]" = (),
     ) -> None:
-        super().__init__(place, problem, remedy, words, others)  # what pickle makes it anew from
+        super().__init__(place, problem, remedy, words, others)  # arguments from which pickle restores the error
         self.place, self.problem, self.advice = place, problem, remedy
         self.words, self.others = dict(words or {}), others
 
@@ -71,7 +71,7 @@ class InputError(StickslipError):
         return InputError(f"{place}: {self.place}", self.problem, self.advice, self.words, others)
 
     def under(self, old: str, new: str) -> "InputError":
-        """Return the same errors, each place prefixed by `new`, which replaces `old` where it begins with that."""
+        """Return the same errors, each place prefixed by `new`; a prefix `old` is removed."""
         others = tuple(other.under(old, new) for other in self.others)
         place = f"{new}: {self.place.removeprefix(f'{old}: ')}"
         return InputError(place, self.problem, self.advice, self.words, others)
@@ -119,7 +119,7 @@ def _cut(text: str) -> str:
 
 
 def _capped(lines: list[str]) -> list[str]:
-    """Return as many lines as a screen holds, at least one, and how many there are more."""
+    """Return as many lines as a screen holds, at least one, and the number of further lines."""
     size = 0
     for n, line in enumerate(lines):
         size += len(line.encode(errors="replace")) + 1
@@ -135,11 +135,11 @@ def together(errors: Iterable[InputError]) -> InputError:
     return InputError(first.place, first.problem, first.advice, first.words, others)
 
 
-MAX_SHORT_WORD = 2  # letters of a word of which no other is a slip
+MAX_SHORT_WORD = 2  # letters of words that are too short for a guess
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """Return the known word nearest to `word`, ignoring case; empty where none is near.
+    """Return the known word nearest to `word`, ignoring case; empty if none is near.
 
     Known words of one or two letters are never returned.
     """
@@ -151,18 +151,18 @@ def nearest(word: str, known: list[str]) -> str:
 
 
 def did_you_mean(word: str, known: list[str]) -> str:
-    """Return ``did you mean 'word'?`` for the `nearest` known word, or the list of the known ones."""
+    """Return ``did you mean 'word'?`` for the `nearest` known word, or the list of known words."""
     near = nearest(word, known)
     if near:
         return f"Did you mean {near!r}?"
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 
-MAX_NAMES = 12  # of sets that a message lists
+MAX_NAMES = 12  # names that a message lists
 
 
 def nearest_and_known(word: str, known: list[str]) -> str:
-    """Return ``did you mean 'word'?`` where a known word is near, then the list of known words, shortened where it is long."""
+    """Return ``did you mean 'word'?`` if a known word is near, then the list of known words, shortened if it is long."""
     near = did_you_mean(word, known)
     if not near.startswith("Did"):
         near = ""
@@ -172,7 +172,7 @@ def nearest_and_known(word: str, known: list[str]) -> str:
     return f"{near} {listed}".strip()
 
 
-IMPORTED_AS = {"scikit-fem": "skfem", "feral-solver": "feral"}  # packages with another name
+IMPORTED_AS = {"scikit-fem": "skfem", "feral-solver": "feral"}  # packages with another import name
 
 
 def missing_package(package: str, error: Exception, extra: str) -> StickslipError:

@@ -1,4 +1,4 @@
-"""Square matrices that need not be arrays: known by their products, or in a border. What solvers take and problems hand out."""
+"""Square matrices that need not be arrays, the interface of problems to solvers: matrix products, bordered matrices."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,9 +7,9 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 
-# a Newton iteration: its systems by LU, those by a Krylov method, which leaves a hundredth of the residual, and the products of one of these
+# in a Newton iteration: systems by LU, systems by a Krylov method that leaves 1 % of the residual, products of the latter
 BY_ARRAY, BY_PRODUCTS, PRODUCTS = 4, 6, 8
-MAX_CHEAP_ARRAY = 500  # unknowns up to which a whole array is had without asking what it costs
+MAX_CHEAP_ARRAY = 500  # unknowns up to which a whole array is assembled whatever its cost
 
 
 class JacobianOperator(Protocol):
@@ -28,16 +28,16 @@ class JacobianOperator(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """Seconds of one core that a linear system is estimated to cost.
+    """Estimated cost of a linear system, in seconds of one core.
 
     Parameters
     ----------
     product
-        One product with the matrix and the preconditioner, and the share of a Krylov method in it.
+        One product with the matrix and the preconditioner, with the work of the Krylov method for it.
     factors
         A new preconditioner.
     array
-        The assembled matrix and its factors, or its Schur complement where some unknowns are eliminated.
+        The assembled matrix and its factors, or its Schur complement if some unknowns are eliminated.
     """
 
     product: float
@@ -46,7 +46,7 @@ class Costs:
 
     @property
     def products_pay(self) -> bool:
-        """Whether a Newton iteration costs less by products than by arrays, where few contacts slip."""
+        """Whether a Newton iteration costs less by products than by arrays if few contacts slip."""
         return self.factors + BY_PRODUCTS * PRODUCTS * self.product < BY_ARRAY * self.array
 
 
@@ -58,15 +58,15 @@ class Inverse(Protocol):
     """The solution of systems with one matrix."""
 
     def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray | None:
-        """Return the solution for the right side (n,), of the transposed system where that is asked for; None if there is none."""
+        """Return the solution for the right side (n,), of the transposed system if requested; None if there is none."""
         ...
 
 
 class Elimination(Protocol):
     """Schur complement S of a square matrix J, after cheap unknowns R are eliminated.
 
-    With the remaining unknowns A it is ``S = J_AA - J_AR J_RR⁻¹ J_RA``. ``J x = b`` is solved by ``S x_A = b_A - J_AR J_RR⁻¹ b_R``. For a
-    transposed system the same unknowns are eliminated.
+    With the remaining unknowns A it is ``S = J_AA - J_AR J_RR⁻¹ J_RA``. ``J x = b`` is solved by
+    ``S x_A = b_A - J_AR J_RR⁻¹ b_R``. For a transposed system the same unknowns are eliminated.
     """
 
     @property
@@ -151,7 +151,7 @@ class Bordered:
         return np.append(times(self.jac, x) + columns @ z, rows @ x + corner @ z)
 
     def rmatvec(self, v: FloatArray) -> FloatArray:
-        """Return the product of its transpose with `v` (n + m,)."""
+        """Return the product of the transposed matrix with `v` (n + m,)."""
         columns, rows, corner = self.borders
         x, z = np.split(v, [columns.shape[0]])
         return np.append(transposed_times(self.jac, x) + z @ rows, x @ columns + z @ corner)

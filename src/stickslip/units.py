@@ -12,8 +12,8 @@ RPM = 2 * math.pi / 60  # rad/s
 DEG = math.pi / 180  # rad
 MM = 1e-3  # m
 
-TO_SI = {"hz": HZ, "rpm": RPM, "deg": DEG, "mm": MM}  # of units that keys end with; others are SI
-# of what is shared among the points of an interface, given for a square metre
+TO_SI = {"hz": HZ, "rpm": RPM, "deg": DEG, "mm": MM}  # factors of units at the end of keys; other units are SI
+# unit of a quantity shared among the points of an interface -> its unit per square metre
 PER_AREA = {"n_per_m": "n_per_m3", "n": "pa", "n_per_m3": "n_per_m5", "n_s_per_m": "n_s_per_m3"}
 _METADATA = "quantity"
 
@@ -29,7 +29,7 @@ class Quantity:
     unit
         Suffix of the key, e.g. ``m``, ``deg``, ``n_per_m``; empty for numbers without one.
     key
-        Key without the unit, where it differs from the field's name.
+        Key without the unit, if it differs from the field's name.
     above, least, below, most
         Bounds of the values, in the key's unit: ``> above``, ``>= least``, ``< below``, ``<= most``.
     usual
@@ -117,14 +117,14 @@ class Quantity:
         )
 
 
-LONGEST_M = 1e3  # amplitude beyond which no number is given: a motion that grows without bound
+LONGEST_M = 1e3  # amplitude above which no number is stated: the motion grows without bound
 BEYOND = "more than a kilometre"
-LARGEST_PERCENT = 1e5  # of a difference that is told: beyond it one of the two is no amplitude
+LARGEST_PERCENT = 1e5  # largest difference that is stated: beyond, one of the two values is no amplitude
 _ANY = Quantity(about="")
 
 
 def millimetres(size: float, digits: int = 4) -> str:
-    """Return an amplitude (m) in millimetres for a sentence; in words where it is NaN or implausibly large."""
+    """Return an amplitude (m) in millimetres for a sentence; in words if it is NaN or implausibly large."""
     return _beyond(size) or f"{1e3 * size:.{digits}g} mm"
 
 
@@ -152,7 +152,7 @@ def quantity(about: str, unit: str = "", *, default: Any = MISSING, **limits: An
     Raises
     ------
     InputError
-        If the value is shared among points and `PER_AREA` has no unit for a square metre of it.
+        If the value is shared among points and `PER_AREA` lacks its unit per square metre.
     """
     if limits.get("shared") and unit and unit not in PER_AREA:
         raise input_error(
