@@ -1,4 +1,4 @@
-"""Points in the order of the branch, with cheap indicators of a change of stability: folds, the sign of the determinant, the list of transitions in a period."""
+"""Points in the order of the branch, with cheap indicators of a change of stability: folds, sign of the determinant, contact transitions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,26 +14,26 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.flow_map.contact_states import ContactStates, is_located, located_part, located_states
 from stickslip.solve.linear import factors_of
 
-MOST_ROWS = 500  # of a Jacobian that is factorised for its sign alone
+MOST_ROWS = 500  # largest Jacobian that is factorised only for its sign
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """The converged points of a response along its branch.
+    """Converged points of a response along its branch.
 
     Parameters
     ----------
     order
         (n,) positions of the points in the response.
     sign
-        (n,) sign of the determinant of the Jacobian of the balance, NaN where unknown. It is the parity of the number of real multipliers
-        above 1, up to one sign for the whole branch.
+        (n,) sign of the determinant of the balance's Jacobian, NaN where unknown. It is the parity of the number of real multipliers above
+        1, up to one sign for the whole branch.
     cycle
         (n,) transitions of each point; see `cycle_of`.
     fold
-        (n - 1,) whether the branch folds between two neighbours, or beside one of them.
+        (n - 1,) whether the branch folds between two neighbours, or close to one of them.
     cut
-        (n - 1,) whether the branch is interrupted between two neighbours: a point is missing, or the response jumps.
+        (n - 1,) whether the branch is interrupted between two neighbours, by a missing point or a jump of the response.
     """
 
     order: tuple[int, ...]
@@ -43,7 +43,7 @@ class Course:
     cut: BoolArray
 
     def like(self, a: int, b: int) -> bool:
-        """Whether all points from a to b have the same sign and transitions without a fold; then a verdict at both ends holds between them."""
+        """Whether all points from a to b have the same sign and transitions, without a fold; then equal verdicts at both ends hold between."""
         a, b = min(a, b), max(a, b)
         signs, cycles = self.sign[a : b + 1], set(self.cycle[a : b + 1])
         one = bool(np.all(signs == signs[0])) and len(cycles) == 1 and None not in cycles
@@ -60,7 +60,7 @@ class Course:
         return np.asarray(self.sign[1:] * self.sign[:-1] < 0.0)
 
     def runs(self) -> Iterator[range]:
-        """Yield the ranges without interruption of the branch."""
+        """Yield the uninterrupted ranges of the branch."""
         ends = [0, *(np.flatnonzero(self.cut) + 1).tolist(), len(self.order)]
         yield from (range(a, b) for a, b in pairwise(ends) if a < b)
 
@@ -71,9 +71,9 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
     Parameters
     ----------
     problem
-        The problem that was solved.
+        The solved problem.
     points
-        The accepted points. Those from `along` on resolve the peak; their place on the branch is the nearest one.
+        The accepted points. Points from `along` on resolve the peak; they are inserted at the nearest position of the branch.
     along
         Number of points in the order of the branch.
     jumps
@@ -81,7 +81,7 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
     """
     branch = [i for i in range(along) if points[i].converged]
     others = [i for i in range(along, len(points)) if points[i].converged]
-    if len(branch) < 2:  # nothing to find a place on
+    if len(branch) < 2:  # no steps to insert points in
         branch, others = sorted([*branch, *others], key=lambda i: points[i].omega), []
     steps = np.diff([points[i].omega for i in branch])
     back = steps[1:] * steps[:-1] < 0.0
@@ -103,10 +103,10 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
 
 
 def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the sign of the determinant of the balance's Jacobian at a solution; NaN where it is not known.
+    """Return the sign of the determinant of the balance's Jacobian at a solution; NaN if unknown.
 
-    On a branch it follows from the tangent and the sign of the bordered determinant, which the continuation knows (Cramer's rule).
-    Elsewhere a small Jacobian is factorised.
+    On a branch it follows from the tangent and the sign of the continuation's bordered determinant (Cramer's rule). Elsewhere a small
+    Jacobian is factorised.
     """
     if point.tangent.size and point.orientation:
         return float(np.sign(point.tangent[-1]) * point.orientation) or np.nan
@@ -119,7 +119,7 @@ def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _inserted(points: Sequence[ForcedPoint], branch: Sequence[int], others: Sequence[int]) -> dict[int, list[int]]:
-    """Return the additional points within each step of a branch, each where it lengthens the branch least."""
+    """Assign additional points to the steps of a branch, each where it lengthens the branch least."""
     if not others:
         return {}
     rows = _scaled([points[i] for i in (*branch, *others)])
@@ -147,10 +147,10 @@ def _scaled(points: Sequence[ForcedPoint]) -> FloatArray:
 
 
 def cycle_of(problem: ForcedProblem, point: ForcedPoint) -> bytes | None:
-    """Return a text that identifies the transitions in the cycle of each contact; None where they are unknown.
+    """Return a key of the transitions in the cycle of each contact; None where they are unknown.
 
-    The order of simultaneous transitions of two contacts does not matter, since no multiplier jumps there. For laws without located
-    transitions the states at the samples count.
+    The order of transitions of different contacts does not matter, since no multiplier jumps where it changes. For laws without located
+    transitions, the states at the samples count.
     """
     balance = problem.balance(point.support)
     if not isinstance(balance, HarmonicBalance):
@@ -183,10 +183,10 @@ def _located(states: ContactStates, contact: int) -> bytes:
 
 
 def _cycle(rows: FloatArray) -> bytes:
-    """Return the number of different successive rows (n, k) of a cycle, and these rows from a start that does not depend on the beginning."""
+    """Return the number of distinct successive rows (n, k) of a cycle, and these rows independently of where the cycle begins."""
     changed = np.any(rows != np.roll(rows, 1, axis=0), axis=1)
     chosen = rows[changed] if np.any(changed) else rows[:1]
-    # a contact changes at few of the times at which any of them does
+    # a contact changes at few of the times at which any contact changes
     kept = [b"".join(b"%d" % v for v in row) for row in chosen.astype(np.int64).tolist()]
     turned = min(kept[i:] + kept[:i] for i in range(len(kept)))
     return b"%d:" % len(kept) + b",".join(turned)

@@ -7,23 +7,23 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 
-ROUGH = 0.5  # error of a multiplier, relative to it, beyond which it shows no growth
-NEUTRAL = 1e-3  # change of a disturbance in a period, relative to it, that is neither growth nor decay
-TURNED = 0.1  # part of a multiplier's change along its circle that counts for its modulus
-CLEAR = 2.0  # times that change, from the real axis: a pair that is nearer may meet there and part
+ROUGH = 0.5  # relative error of a multiplier above which it proves no growth
+NEUTRAL = 1e-3  # distance of a modulus from 1 up to which it counts as neither growth nor decay
+TURNED = 0.1  # share of a multiplier's change that counts as error of the modulus
+CLEAR = 2.0  # distance from the real axis, over a multiplier's change, below which a complex pair may become real
 
 Verdict = Literal["stable", "unstable", "neutral", "undecided"]
-ROUNDS_TO_ONE = 5e-4  # off 1, below which four digits may say 1
-UNIT_TOLERANCE = 1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
+ROUNDS_TO_ONE = 5e-4  # distance from 1 below which four digits may show 1
+UNIT_TOLERANCE = 1e-6  # distance from 1: far above the rounding of a period, far below the damping of any structure
 
 
 @dataclass(frozen=True, eq=False)
 class Floquet:
     """Multipliers of a periodic motion.
 
-    A multiplier within `UNIT_TOLERANCE` of 1 is called neutral and is not judged: residual tractions of contacts that
-    never slip, and places of bodies that nothing holds, form families of periodic motions beside each other. One on the
-    unit circle elsewhere belongs to a vibration that nothing damps; it neither grows nor dies, and counts as stable.
+    A multiplier within `UNIT_TOLERANCE` of 1 is neutral and is not judged: it belongs to a family of periodic motions, with
+    different residual tractions of sticking contacts or different positions of free bodies. Other multipliers on the unit
+    circle belong to undamped vibrations, which neither grow nor decay and count as stable.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class Floquet:
 
     @property
     def growth(self) -> float:
-        """Largest modulus of the multipliers that are not neutral; 0 if there are none."""
+        """Largest modulus of the non-neutral multipliers; 0 without any."""
         return float(np.max(np.abs(self.multipliers[~self._neutral]), initial=0.0))
 
     @property
     def stable(self) -> bool:
-        """Whether no small disturbance grows: all moduli but those of neutral multipliers are at most 1."""
+        """Whether no small disturbance grows: the moduli of all non-neutral multipliers are at most 1."""
         return self.growth <= 1.0 + UNIT_TOLERANCE
 
     @property
@@ -60,7 +60,7 @@ class Floquet:
 
 
 def floquet(monodromy: FloatArray) -> Floquet:
-    """Return the multipliers of a monodromy matrix, which is NaN where the motion was lost."""
+    """Return the multipliers of a monodromy matrix; NaN where the matrix is NaN, since the motion was lost."""
     if not np.all(np.isfinite(monodromy)):
         return Floquet(np.full(len(monodromy), np.nan, dtype=complex))
     values = np.linalg.eigvals(monodromy)
@@ -74,22 +74,23 @@ class Stability:
     Parameters
     ----------
     floquet
-        Multipliers of the states of structure and moving sliders; those of `resting` sliders, which are 1, are left out.
+        Multipliers of the states of structure and moving sliders. `resting` sliders have multipliers of 1, which are left out.
     errors
         (n_states,) error of each multiplier against the motion with all harmonics: its change with more harmonics and, for laws with
-        sampled tangents, with half the step. Not finite where unknown. The error of the step is underestimated where friction stops a
-        light mass within a step (measured: up to twenty times) and where planar contacts close into stick (up to ten times).
+        sampled tangents, with half the step. Not finite where unknown. The step error is underestimated where friction stops a light
+        mass within a step (measured: by up to a factor of 20) and where planar contacts close into stick (up to 10).
     resting
         Number of tangential springs, planar contacts included, whose sliders rest for the whole period. Each slider is a parameter of the
         motion, not a state.
     grazing
-        Number of these that touched their limit once and rest since; the multipliers are one-sided, of the resting side.
+        Number of these that reached their slip limit once and have rested since; the multipliers are one-sided, of the sticking side.
     transitions
         Number of transitions located in the period.
     moduli
-        (n_states,) errors of the moduli, which are smaller than those of the angles since damping fixes the moduli; None: `errors`.
+        (n_states,) errors of the moduli, which are smaller than the errors of the angles since damping determines the moduli; None:
+        `errors`.
     work
-        Estimated floating point operations of the examination, from the sizes of its matrices.
+        Estimated floating-point operations of the computation.
     """
 
     floquet: Floquet
@@ -107,11 +108,11 @@ class Stability:
 
     @property
     def verdict(self) -> Verdict:
-        """Stable, unstable or neutral; undecided where the error of a modulus reaches the unit circle.
+        """Stable, unstable or neutral; undecided if the error of a modulus reaches the unit circle.
 
         A multiplier above 1 with an error above half its value proves no growth. Multipliers of 1 within rounding belong to families of
-        motions and are not judged. Any other multiplier within `NEUTRAL` of the unit circle, error included, is neutral: an undamped
-        vibration, or the drift of a slider.
+        motions and are not judged. Any other multiplier within `NEUTRAL` of the unit circle, error included, is neutral, such as an
+        undamped vibration or the drift of a slider.
         """
         size, errors = self._judged
         if np.any(self._outside):
@@ -132,12 +133,12 @@ class Stability:
 
     @property
     def multiplier(self) -> float:
-        """Modulus of the multiplier that decides, see `reason`; 0 where all belong to families, NaN where none is known."""
+        """Modulus of the deciding multiplier, see `reason`; 0 if all belong to families, NaN if none is known."""
         return self._decisive[0]
 
     @property
     def multiplier_error(self) -> float:
-        """Error bound of that modulus against the motion with all harmonics."""
+        """Error bound of the deciding modulus against the motion with all harmonics."""
         return self._decisive[1]
 
     @property
@@ -161,7 +162,7 @@ class Stability:
 
     @property
     def grows(self) -> bool:
-        """Whether a multiplier lies outside the unit circle, errors apart."""
+        """Whether a multiplier lies outside the unit circle, without regard to errors."""
         size, _ = self._judged
         return bool(np.any(size > 1.0 + UNIT_TOLERANCE))
 
@@ -175,19 +176,19 @@ class Stability:
 
     @property
     def _outside(self) -> BoolArray:
-        """Return which of these prove growth."""
+        """Return whether each judged multiplier proves growth."""
         size, errors = self._judged
         return (size - errors > 1.0 + UNIT_TOLERANCE) & (errors <= ROUGH * size)
 
     @property
     def _reaching(self) -> BoolArray:
-        """Return which of these may lie on or outside the unit circle."""
+        """Return whether each judged multiplier may lie on or outside the unit circle."""
         size, errors = self._judged
         return ~(size + errors < 1.0 - UNIT_TOLERANCE)
 
     @property
     def _decisive(self) -> tuple[float, float]:
-        """Return modulus and error of the largest multiplier among those that decide the verdict."""
+        """Return modulus and error of the largest deciding multiplier."""
         size, errors = self._judged
         of_verdict = next((own for own in (self._outside, self._reaching) if np.any(own)), size >= 0.0)
         if not np.any(of_verdict):
@@ -221,15 +222,15 @@ def partners(coarse: ComplexArray, fine: ComplexArray) -> ComplexArray:
 
 
 def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return the changes of multipliers against a less accurate motion, and the errors of their moduli that follow from these.
+    """Return the changes of multipliers against a less accurate motion, and the resulting errors of their moduli.
 
-    Damping alone gives the modulus of a complex pair until the pair meets on the real axis. So the error is twice the change of the
-    modulus plus the share `TURNED` of the change of the angle; where the pair may meet it is the whole change.
+    Damping alone determines the modulus of a complex pair until the pair meets on the real axis. The error is therefore twice the change of
+    the modulus, at least the share `TURNED` of the whole change; where the pair may meet, it is the whole change.
 
     Parameters
     ----------
     found, other
-        (n,) and (m,) multipliers; where there are fewer others, they are zero.
+        (n,) and (m,) multipliers; missing others count as zero.
     """
     rest = np.zeros(max(0, found.size - other.size))
     theirs = partners(np.append(other, rest), found)
@@ -240,7 +241,7 @@ def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, Float
 
 
 def modulus_text(size: float, error: float = 0.0) -> str:
-    """Return a modulus with four digits and its error; close to 1 its difference from 1, which decides."""
+    """Format a modulus with four digits and its error; close to 1, show its difference from 1, which decides."""
     off = size - 1.0
     text = f"{size:.4g}"
     if 0.0 < abs(off) < ROUNDS_TO_ONE:

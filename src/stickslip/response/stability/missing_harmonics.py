@@ -13,30 +13,35 @@ from stickslip.harmonic.selection.alert import silent
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 from stickslip.solve.newton_method import newton
 
-HARMONICS_FACTOR, HARMONICS_MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and MORE,
-MAX_SOLVED_HARMONICS = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
-FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harmonics beyond it change as much again
-STEP_WORK = 1e6  # floating point operations of a Newton step for each of its unknowns
-MOST_ROWS = 4500  # of a motion that is solved for its multipliers
-SOLUTIONS = 10  # of a point, at most
-FAILED = 3  # of them one after the other, after which the motion in time costs less
-MIN_HARMONICS = 11  # and at least these: after H = 1, five are too few to see what closings do
+HARMONICS_FACTOR, HARMONICS_MORE = (
+    2,
+    3,
+)  # highest harmonic of the step: FACTOR times the highest of the motion plus MORE,
+MAX_SOLVED_HARMONICS = 41  # highest harmonic of full solutions: beyond, time integration costs less
+FARTHER = (
+    2.0  # error over change, for a solution farther away than one step: higher harmonics may change it as much again
+)
+STEP_WORK = 1e6  # floating-point operations of a Newton step for each unknown
+MOST_ROWS = 4500  # largest system that is solved for multipliers
+SOLUTIONS = 10  # largest number of solutions of a point
+FAILED = 3  # successive failures after which time integration costs less
+MIN_HARMONICS = 11  # and at least this one: after H = 1, five harmonics do not resolve closures
 
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
-    """A point with more harmonics, and the floating point operations that it took."""
+    """Point with more harmonics, and the floating-point operations to solve it."""
 
     point: ForcedPoint
     work: float
 
 
 def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, float] | None:
-    """Return a point after a Newton step with more harmonics, and the ratio of an error to the change by this step.
+    """Return a point after a Newton step with more harmonics, and the ratio of the error to the change by this step.
 
-    The Jacobian Alert predicts errors from this step. If it increases the residual, Newton's method continues to a solution with up to
-    `MOST` harmonics, whose change counts `FARTHER` times. The result is the point itself if no force acts on the missing harmonics,
-    and None if no solution is found.
+    The Jacobian Alert predicts errors by the same step. If the step increases the residual, Newton's method continues to a solution with up
+    to `MAX_SOLVED_HARMONICS`, whose change counts `FARTHER` times. The result is the point itself if no force acts on the missing
+    harmonics, and None if no solution is found.
     """
     step = corrected_by_step(problem, point)
     if step is not None:
@@ -48,7 +53,10 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, 
 
 
 def corrected_by_step(problem: ForcedProblem, point: ForcedPoint) -> Corrected | None:
-    """Return a point after a Newton step with more harmonics: itself if no force acts on these, None if the step increases the residual."""
+    """Return a point after a Newton step with more harmonics.
+
+    The result is the point itself if no force acts on these harmonics, and None if the step increases the residual.
+    """
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
     fed = {*judging_set_of(low), *harmonics_of(max(MIN_HARMONICS, HARMONICS_FACTOR * low.order + HARMONICS_MORE))}
@@ -68,7 +76,7 @@ def corrected_by_step(problem: ForcedProblem, point: ForcedPoint) -> Corrected |
 
 
 def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corrected | None:
-    """Return the motion of a point solved with harmonics up to an order; None where Newton's method finds none."""
+    """Return the motion of a point solved with harmonics up to an order; None without convergence."""
     high = _more(problem, harmonics_of(order))
     start = high.unknowns(point.coefficients)
     found = newton(lambda x: high.linearise(x, point.omega), start, problem.sweep.newton)
@@ -79,7 +87,7 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
 
 
 def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corrected]:
-    """Yield the motion solved with more and more harmonics, in smaller steps where a solution fails."""
+    """Yield the motion solved with increasing harmonics, in smaller steps after a failure."""
     reached, order = point, max(HARMONICS_FACTOR * point.order + HARMONICS_MORE, MIN_HARMONICS)
     failed = 0
     for _ in range(SOLUTIONS):
@@ -95,18 +103,18 @@ def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corre
             continue
         failed = 0
         if more.point.order <= reached.order:
-            return  # a wheel has no more waves
+            return  # the wheel has no more waves
         yield more
         reached, order = more.point, HARMONICS_FACTOR * order + HARMONICS_MORE
 
 
 def newton_work(rows: int) -> float:
-    """Return an estimate of the floating point operations of a Newton step with its contacts, proportional to the rows (measured from 99 to 3000)."""
+    """Estimate the floating-point operations of a Newton step with contacts, proportional to the rows (measured from 99 to 3000)."""
     return STEP_WORK * rows
 
 
 def with_more(point: ForcedPoint, coefficients: ComplexArray, harmonics: IntArray, error: float) -> ForcedPoint:
-    """Return the motion of a point with more harmonics, and its predicted error, as a point on its own."""
+    """Return the motion of a point with more harmonics and its predicted error as a new point."""
     none = np.zeros(0)
     return replace(
         point,
@@ -129,6 +137,6 @@ def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPo
 
 
 def _more(problem: ForcedProblem, harmonics: Harmonics) -> HarmonicBalance:
-    """Return the problem with these harmonics, on a wheel those that its waves allow, and the samples that they need."""
+    """Return the problem with these harmonics, as far as a wheel has their waves, and with enough samples."""
     most = problem.high.linear.most
     return with_stiffness(problem.balance(tuple(h for h in harmonics if most is None or h <= most)))

@@ -23,10 +23,10 @@ from stickslip.response.stability.flow_map.sampled_tangents import Path, Sampled
 from stickslip.response.stability.found import UNIT_TOLERANCE, Floquet, Stability, changes, floquet, partners
 from stickslip.response.time.sectors import InTime
 
-SAMPLES = 256  # of a period, where laws are known by their tangents; and twice as many
+SAMPLES = 256  # in a period for laws with sampled tangents; the finest step has twice as many
 SAMPLES_PER_HARMONIC = 16
-PRODUCTS = 20  # of matrices for the exponential of an interval
-DECOMPOSED = 25  # products of matrices that the eigenvalues of one take
+PRODUCTS = 20  # matrix products for the exponential of an interval
+DECOMPOSED = 25  # cost of eigenvalues, in matrix products
 
 
 @by_one_thread
@@ -35,8 +35,8 @@ def motion_stability(
 ) -> Stability:
     """Return the stability of a given periodic motion of a structure with contacts.
 
-    Disturbances obey the linear equations of the structure and of the states that each contact is in; the motion enters through the
-    times of the transitions and the rates there.
+    Disturbances obey the linear equations of the structure and of the present contact states; the motion enters through the times of the
+    transitions and the rates there.
 
     Parameters
     ----------
@@ -47,19 +47,19 @@ def motion_stability(
     gap_coefficients
         (2H+1, 3 n_contacts) real Fourier coefficients of the gaps, m.
     omega
-        rad/s.
+        Frequency of the motion, rad/s.
 
     Raises
     ------
     InputError
-        If a contact is rigid, harmonics vibrate as different structures, or the structure cannot be marched in time.
+        If a contact is rigid, harmonics have different structural matrices, or the structure has no equations in time.
     """
     whole = one_structure(structure, "stability")
     return stability_in_time(InTime(whole, interface, gap_coefficients), omega)
 
 
 def stability_in_time(own: InTime, omega: float) -> Stability:
-    """Return the stability of a motion of a structure prepared for time stepping; see `motion_stability`."""
+    """Return the stability of a motion of a structure in time; see `motion_stability`."""
     modes = _prepared(own.structure, own.contacts, omega)
     contacts = located_states(own.contacts, own.gaps)
     if contacts is None:
@@ -73,10 +73,9 @@ def stability_in_time(own: InTime, omega: float) -> Stability:
 
 
 def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, int] | None:
-    """Return the monodromy matrix of a motion, modal states first; None where unknown.
+    """Return the modal states, the monodromy matrix (modal states first) and the number of shares of the period; None if unknown.
 
-    For a travelling wave the matrix covers one share of the period, and the number of shares is returned. For laws with sampled tangents
-    it is that of the finest samples.
+    For a travelling wave the matrix covers one share of the period. For laws with sampled tangents it belongs to the finest samples.
     """
     interface = own.contacts
     modes = _prepared(own.structure, interface, omega)
@@ -95,7 +94,7 @@ def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, i
 
 
 def _located_matrix(modes: ModalStates, contacts: ContactStates, own: InTime) -> tuple[FloatArray, int]:
-    """Return the matrix of a share of the period, and the number of shares (1 for a motion without any)."""
+    """Return the monodromy matrix of a share of the period, and the number of shares (1 without symmetry)."""
     share = share_of_monodromy(modes, contacts, own)
     return (monodromy(modes, contacts), 1) if share is None else (share, own.shares)
 
@@ -119,7 +118,7 @@ def _prepared(structure: Structure, interface: Interface, omega: float) -> Modal
 def _samples(
     contacts: ContactStates, own: IntArray, gap_coefficients: FloatArray, halves: int
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Return the samples of a period (`halves` / 2 times the least number), and the gaps of the contacts `own`."""
+    """Return the samples of a period (`halves` / 2 times the smallest number), and the Fourier coefficients of the contacts `own`."""
     samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
     polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     return sample_times(contacts, samples, halves), polynomials
@@ -128,7 +127,7 @@ def _samples(
 def _judged(
     contacts: ContactStates, multipliers: ComplexArray, errors: FloatArray, moduli: FloatArray, n: int, more: int = 0
 ) -> Stability:
-    """Return the stability with a multiplier of zero for each slider without a state when the period begins."""
+    """Return the stability with a multiplier of zero for each slider without a state at the beginning of the period."""
     size = 2 * n + contacts.rows.size + contacts.always_slipping + more
     rest = np.zeros(max(0, size - multipliers.size))
     found = Floquet(np.append(multipliers[:size], rest.astype(complex)))
@@ -148,7 +147,7 @@ def _sampled(
 ) -> Stability:
     """Return the stability with sampled tangents of the contacts `own`, extrapolated from two steps.
 
-    A third step between these protects the error against two steps that agree by chance, which happens with errors of first order.
+    A third step between these protects the error estimate against chance agreement of two steps, which happens with first-order errors.
     """
     laws = [interface.laws[c] for c in own]
     made = [_samples(contacts, own, gap_coefficients, halves) for halves in (2, 3, 4)]
@@ -164,7 +163,7 @@ def _sampled(
     extrapolated = fine + (fine - partners(coarse, fine)) / 3.0
     pairs = [changes(fine, other) for other in (coarse, between)]
     errors, moduli = (np.maximum(a, b) for a, b in zip(*pairs, strict=True))
-    # a multiplier of 1 is one of a state that keeps its memory, and is not moved
+    # an exact multiplier of 1 belongs to a permanent state
     extrapolated[np.abs(fine - 1.0) <= UNIT_TOLERANCE] = 1.0
     same = np.all([np.all(each.kept == kept, axis=1) for each in tangents], axis=0)
     resting, grazing = (int(np.sum(n[same])) for n in (tangents[-1].resting, tangents[-1].grazing))
@@ -177,7 +176,7 @@ def _sampled(
 def _tangents(
     laws: list[ContactLaw], own: IntArray, times: list[FloatArray], polynomials: FloatArray, omega: float
 ) -> SampledTangents:
-    """Return the tangents of laws at samples, without their parts with located transitions."""
+    """Return the sampled tangents of laws, without their parts with located transitions."""
     found = sampled_tangents(laws, own, Path(np.concatenate(times), polynomials, omega))
     apart = [located_part(law) is not None for law in laws]
     found.jac[:, apart, 2] = 0.0
@@ -185,6 +184,6 @@ def _tangents(
 
 
 def _unknown(n: int) -> Stability:
-    """Return an unknown stability: rounding made more transitions than such gaps can have, or a law gave no tangents."""
+    """Return an unknown stability: rounding made more transitions than possible, or a law gave no tangents."""
     unknown = np.full(2 * n, np.nan, dtype=complex)
     return Stability(Floquet(unknown), np.full(2 * n, np.inf), 0, 0, 0)

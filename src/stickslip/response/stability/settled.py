@@ -13,15 +13,15 @@ from stickslip.response.stability.missing_harmonics import corrected_by_step, mo
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
 
-ROUGHLY = 3.0  # times the change by one Newton step that a multiplier may be off
-FIRST = 2.0  # times the change from the motion as it was solved
-SAME_MOTION = 0.1  # of the threshold: a motion with more harmonics that is nearer is the point itself
-OTHER = 2.0  # times more for either where the numbers of transitions differ
+ROUGHLY = 3.0  # error of a multiplier over its change by one Newton step
+FIRST = 2.0  # error of a multiplier over its change from the motion as solved
+SAME_MOTION = 0.1  # distance over the threshold, up to which a motion with more harmonics is the same motion
+OTHER = 2.0  # additional factor on both errors if the numbers of transitions differ
 
 
 @dataclass(frozen=True, eq=False)
 class _Rung:
-    """A motion with more harmonics than the one before, and its relative difference from that."""
+    """Motion with its stability, and its relative change from the previous motion with fewer harmonics."""
 
     point: ForcedPoint
     stability: Stability
@@ -30,15 +30,15 @@ class _Rung:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Stability of a point, and the motion with it if the point as solved has another stability.
+    """Stability of a point, and the motion that has it if this is not the point as solved.
 
     Parameters
     ----------
     stability
         Stability of the motion with more harmonics.
     motion
-        The motion with more harmonics if the point as solved has another stability or is another motion; its predicted error is its
-        change from fewer harmonics. Otherwise None.
+        The motion with more harmonics, if the point as solved differs in stability or is another motion; its predicted error is its change
+        from fewer harmonics. Otherwise None.
     """
 
     stability: Stability
@@ -47,7 +47,7 @@ class Settled:
 
 @by_one_thread
 def stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Stability:
-    """Return the stability of a solved point of a forced response; see `settled_stability`, which returns the motion beside it."""
+    """Return the stability of a solved point of a forced response; `settled_stability` also returns the motion."""
     return settled_stability(problem, point, more).stability
 
 
@@ -55,12 +55,12 @@ def stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | No
 def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Settled:
     """Return the stability of a solved point of a forced response.
 
-    The multipliers are those of the motion after a Newton step with more harmonics; their error is their change by this step times
-    `ROUGHLY`. If the verdict stays open, the motion is solved with about twice the harmonics each time, and the change from one solution
-    to the next is the error. Few harmonics give transition times less accurately than amplitudes.
+    The multipliers belong to the motion after a Newton step with more harmonics, since few harmonics give transition times less accurately
+    than amplitudes. Their error is their change by this step times `ROUGHLY`. If the verdict stays open, the motion is solved repeatedly with
+    about twice the harmonics, and the change from one solution to the next is the error.
 
-    Beside a fold, or where contacts bounce, several motions lie within a few percent, and more harmonics may lead to another of them. The
-    verdict then belongs to the returned motion. A motion farther away than the threshold of the strategy gives no verdict on the point.
+    Near a fold, or where contacts bounce, several motions lie within a few percent, and more harmonics may lead to another one. The verdict
+    then belongs to the returned motion. A motion farther away than the threshold of the strategy gives no verdict on the point.
 
     Parameters
     ----------
@@ -102,9 +102,9 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
 
 
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
-    """Return the stability, with its motion if the point as solved has another stability or lies away; unknown if that motion is no neighbour.
+    """Return the stability, with its motion if the point as solved differs in stability or lies away; unknown if it lies too far away.
 
-    Beside a fold a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to one of them while
+    Near a fold, a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to one of them while
     more harmonics lead to the other; the verdict then belongs to the motion with more harmonics.
     """
     if last is first or found.verdict not in ("stable", "unstable"):
@@ -130,7 +130,7 @@ def _unsure(rung: _Rung) -> Stability:
 def _settled(
     problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
 ) -> tuple[Stability, _Rung]:
-    """Return the stability with more and more harmonics until it is settled, and the last motion; errors are `times` the change from it."""
+    """Return the stability with increasing harmonics until it is settled, and the last motion; the first error is `times` the change."""
     rungs = more_harmonics(problem, last.point)
     while not best.settled and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)

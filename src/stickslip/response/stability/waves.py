@@ -1,4 +1,4 @@
-"""Disturbances of the motion of a whole wheel as travelling waves: which nodal diameter grows."""
+"""Disturbances of the motion of a whole wheel as travelling waves, to find the growing nodal diameter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,22 +12,22 @@ from stickslip.response.stability.multipliers import period_matrix
 from stickslip.response.system import System
 from stickslip.response.time.sectors import all_in_time
 
-FELT = 1e-12  # of the largest multiplier: smaller ones are of states that are forgotten within the period
+FELT = 1e-12  # multiplier over the largest, below which the state is forgotten within the period
 
 
 @dataclass(frozen=True, eq=False)
 class WaveDisturbance:
-    """A disturbance of a motion of all sectors.
+    """Disturbance of a motion of all sectors.
 
     Parameters
     ----------
     multiplier
         Floquet multiplier: growth in a period.
     wave
-        Wave number of the largest part of its shape. A disturbance of a travelling motion also contains the waves that this one makes
+        Wave number with the largest share in the shape. A disturbance of a travelling motion also contains the combinations of this wave
         with the harmonics of the motion.
     share
-        Share of that wave in the squared norm of the shape.
+        Share of this wave in the squared norm of the shape.
     omega
         Frequency of the disturbance, rad/s.
     """
@@ -38,7 +38,7 @@ class WaveDisturbance:
     omega: float
 
     def nodal_diameter(self, sectors: int) -> int:
-        """Return the number of nodal diameters of its wave."""
+        """Return the nodal diameter of the wave."""
         return min(self.wave, sectors - self.wave)
 
 
@@ -51,7 +51,7 @@ def point_disturbances(problem: ForcedProblem, point: ForcedPoint) -> list[WaveD
 
 @by_one_thread
 def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[WaveDisturbance]:
-    """Return the disturbances of a motion of all sectors, the fastest growing first; none where unknown.
+    """Return the disturbances of a motion of all sectors, the fastest growing first; none if they are unknown.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def _by_wave(rows: ComplexArray, sectors: int) -> ComplexArray:
 
 
 def _described(multiplier: complex, moved: ComplexArray, rate: ComplexArray, sectors: int) -> WaveDisturbance:
-    """Return the disturbance of a complex shape; of the shape and its conjugate the one with positive frequency is named."""
+    """Return the disturbance of a complex shape, or of its conjugate, whichever has a positive frequency."""
     size = np.sum(np.abs(moved) ** 2, axis=1)
     at, total = int(np.argmax(size)), float(np.sum(size))
     if total == 0.0:

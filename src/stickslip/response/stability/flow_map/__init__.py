@@ -1,1 +1,1 @@
-"""The monodromy matrix: propagation of disturbances over a period."""
+"""Monodromy matrix: propagation of disturbances over a period."""

@@ -1,8 +1,8 @@
-"""Piecewise-linear contacts in a disturbed motion: stiffness between transitions, and jumps at them.
+"""Piecewise-linear contacts in a disturbed motion: stiffness between transitions, and jumps at transitions.
 
-A sticking tangential spring connects the structure to its slider with stiffness ``k``; a slipping one is a force ``±μ`` times the normal
-force; an open one is nothing. Forces are continuous at every transition, so disturbances of the structure do not jump. Only the slider
-position does: slip and lift-off erase it, and the beginning of stick sets it anew.
+A sticking tangential spring of stiffness ``k`` connects the structure to its slider. A slipping spring exerts ``±μ`` times the normal force, an
+open one no force. Forces are continuous at every transition, so disturbances of the structure do not jump. Only slider positions jump: slip
+and lift-off erase them, and the beginning of stick sets them again.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, SIGN,
 
 @dataclass(frozen=True, eq=False)
 class ContactStates:
-    """The contacts over a period, by the intervals in which none of them changes its state.
+    """States of the contacts over a period, in intervals between transitions.
 
     Attributes
     ----------
     times
         (n_intervals + 1,) ends of the intervals, from the first transition to the same one a period later; τ = ωt.
     stiffness
-        (n_intervals, n_contacts, 3, 3) derivative of the forces by the gaps where sliders rest, N/m.
+        (n_intervals, n_contacts, 3, 3) derivative of the forces by the gaps with fixed sliders, N/m.
     rows
         (n_sliders,) row t or w of the gap operator of each slider that sticks for part of the period.
     normals
@@ -40,11 +40,11 @@ class ContactStates:
     takes_hold
         (n_intervals, n_sliders) whether stick begins with the interval.
     by_normal
-        (n_intervals, n_sliders) derivative of the slider position by the normal gap where stick begins; that by its own gap is one.
+        (n_intervals, n_sliders) derivative of the slider position by the normal gap where stick begins; the derivative by its own gap is one.
     resting
         Number of sliders that stick for the whole period; they are parameters of the motion, not states.
     grazing
-        Number of these that touched their limit once and stick since.
+        Number of these that reached their slip limit once and have stuck since.
     always_slipping
         Number of sliders that never stick.
     transitions
@@ -76,26 +76,26 @@ class _Spring:
 
     @property
     def changes(self) -> BoolArray:
-        """Return which segments begin with a transition; the first may continue the last one of the period before."""
+        """Return whether each segment begins with a transition; the first may continue the last one of the previous period."""
         states = self.segments[:, [STATE, SIGN]]
         return np.asarray(np.any(states != np.roll(states, 1, axis=0), axis=1))
 
 
 def located_part(law: ContactLaw) -> PiecewiseLinear | None:
-    """Return the part of a law with locatable transitions: the whole law, the normal contact of planar friction, or None."""
+    """Return the part of a law with located transitions: the whole law, the normal contact of planar friction, or None."""
     if isinstance(law, PiecewiseLinear):
         return law
     return law.normal_contact() if isinstance(law, NormalContact) else None
 
 
 def is_located(law: ContactLaw) -> bool:
-    """Whether all transitions of a law can be located. Planar contacts without friction have only those of their normal springs."""
+    """Whether all transitions of a law are located; this includes planar contacts without friction."""
     frictionless = isinstance(law, NormalContact) and law.mu == 0.0 and law.normal_contact() is not None
     return isinstance(law, PiecewiseLinear) or frictionless
 
 
 def located_states(interface: Interface, gap_coefficients: FloatArray) -> ContactStates | None:
-    """Return the contact states over a period for laws with located transitions; None where rounding made more transitions than possible.
+    """Return the contact states over a period for laws with located transitions; None if rounding made more transitions than possible.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def contact_states(events: Events, compiled: CompiledContacts, own: IntArray, n_
     compiled
         The laws of these events, all piecewise linear.
     own, n_contacts
-        Indices of these contacts in the interface, and the number of contacts there; the others have no stiffness here.
+        Indices of these contacts in the interface, and its number of contacts; other contacts have no stiffness here.
     """
     springs = _springs(events, compiled)
     openings = [events.crossings[e, : events.n_crossings[e]] for e in range(len(compiled.elements))]
@@ -181,7 +181,7 @@ def _has_slipped(spring: _Spring, row: FloatArray) -> bool:
 
 
 def _add_normal(stiffness: FloatArray, events: Events, compiled: CompiledContacts, middle: FloatArray) -> None:
-    """Add the normal springs of all elements where they are closed."""
+    """Add the normal springs of all closed elements."""
     for c in range(compiled.n_contacts):
         for e in range(compiled.first[c], compiled.first[c + 1]):
             row = compiled.elements[e]
@@ -211,7 +211,7 @@ def _add_tangential(stiffness: FloatArray, spring: _Spring, row: FloatArray, mid
 def _sliders(
     springs: list[_Spring], elements: FloatArray, times: FloatArray, middle: FloatArray
 ) -> tuple[BoolArray, BoolArray, FloatArray]:
-    """Return where sliders stick, where stick begins, and how their position then depends on the normal gap."""
+    """Return where sliders stick, where stick begins, and the derivative of their position by the normal gap there."""
     shape = (middle.size, len(springs))
     sticks, takes_hold = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     by_normal = np.zeros(shape)

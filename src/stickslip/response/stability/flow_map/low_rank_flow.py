@@ -1,14 +1,14 @@
-"""Disturbances over the intervals of a period whose contact states differ in a few springs.
+"""Propagation of disturbances over the intervals of a period whose contact states differ in a few springs.
 
-The base state, in which each contact stays longest, is decomposed into eigenvectors; its exponential is then a product per eigenvalue.
-Another state differs by a matrix of rank r, one for each spring row that differs, ``A = A₀ + U V``. The difference of the exponentials is
-an integral of the difference of the resolvents along a hyperbola around the eigenvalues (Weideman & Trefethen 2007),
+The base state, in which each contact stays longest, is decomposed into eigenvectors; its exponential is then diagonal. Another state
+differs by a matrix of rank r, the number of differing springs: ``A = A₀ + U V``. The difference of the exponentials is an integral of the
+difference of the resolvents along a hyperbola around the eigenvalues (Weideman & Trefethen 2007),
 
     exp(hA) - exp(hA₀) = 1/(2πi) ∫ exp(zh) R U (1 - V R U)⁻¹ V R dz,    R = (z - A₀)⁻¹,
 
-a product of two thin matrices by the trapezoidal rule. Overdamped modes lie far inside the hyperbola and need no halving of the interval;
-the exponential of a full matrix needs five or more. The integral is repeated for one vector with other nodes. If the two differ, the
-interval is halved once more; if they still differ, the full matrix is used.
+which the trapezoidal rule turns into a product of two thin matrices. Overdamped modes lie far inside the hyperbola and need no halving of
+the interval; the exponential of a full matrix needs five halvings or more. As a check, the integral is repeated for one vector with other
+nodes. If the results differ, the interval is halved; if they still differ after some halvings, the full matrix is used.
 """
 
 from typing import Protocol
@@ -20,23 +20,23 @@ from stickslip.response.stability.flow_map.contact_states import ContactStates
 from stickslip.response.stability.flow_map.modal_states import ModalStates
 from stickslip.response.stability.flow_map.propagation import propagate
 
-NODES = 23  # in the upper half plane, the real one among them
-WIDTH, ANGLE, STEP = 21.771, 0.7148, 0.0834  # of the hyperbola, chosen for the least error ...
+NODES = 23  # in the upper half plane, including the real one
+WIDTH, ANGLE, STEP = 21.771, 0.7148, 0.0834  # parameters of the hyperbola, chosen for the smallest error ...
 REACH = 4.0  # ... for all eigenvalues with |Im z| <= REACH - Re z: 2e-13
-MARGIN = 1.25  # eigenvalues of other states lie farther out
-AGREES = 1e-11  # of two sets of nodes
-TRIES = 4
+MARGIN = 1.25  # allowance for eigenvalues of other states, which lie farther out
+AGREES = 1e-11  # largest difference of two sets of nodes
+TRIES = 4  # halvings
 FEW = 50  # coordinates below which the full matrix costs less
-DECOMPOSED = 60.0  # what eigenvectors cost, in products of full matrices;
-FULL, THIN = 17.0, 5.0  # what an interval costs either way, a thin one more by its rank
-ILL = 1e5  # condition of the eigenvectors beyond which they are not used
+DECOMPOSED = 60.0  # cost of the eigenvectors, in products of full matrices
+FULL, THIN = 17.0, 5.0  # cost of an interval by full and by thin matrices; for thin ones the rank adds to it
+ILL = 1e5  # condition number of the eigenvectors above which they are not used
 
 
 class Flow(Protocol):
-    """Propagation of states through intervals, in coordinates of its own."""
+    """Propagation of states through intervals, in its own coordinates."""
 
-    into: FloatArray  # (2n, 2n) these coordinates of the modal states
-    out: FloatArray  # (2n, 2n) and back
+    into: FloatArray  # (2n, 2n) from modal states to these coordinates
+    out: FloatArray  # (2n, 2n) back to modal states
     gaps: FloatArray  # (3 n_contacts, k) gaps of the first k coordinates
 
     def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
@@ -45,7 +45,7 @@ class Flow(Protocol):
 
 
 class FullFlow:
-    """Propagation by the exponential of a full matrix, on the modal states."""
+    """Propagation of modal states by the exponential of a full matrix."""
 
     def __init__(self, modes: ModalStates, contacts: ContactStates) -> None:
         self.modes, self.contacts = modes, contacts
@@ -72,7 +72,7 @@ class LowRankFlow:
         self.rate, self.turn, self.other, self.out = _real_form(values, vectors)
         try:
             self.into: FloatArray = np.linalg.inv(self.out)
-        except np.linalg.LinAlgError:  # a free body: two vectors are one
+        except np.linalg.LinAlgError:  # a free body has a defective eigenvalue
             self.into = np.full_like(self.out, np.inf)
         self.pull = self.into[:, n:] @ modes.pull(modes.gaps)
         self.gaps: FloatArray = modes.gaps @ self.out[:n]
@@ -82,8 +82,8 @@ class LowRankFlow:
         self.probe = np.cos(np.arange(2.0 * n) ** 2)
 
     def advance(self, interval: int, length: float, states: FloatArray, sliders: FloatArray) -> FloatArray:
-        """Propagate by eigenvalues where the contacts are in the base state, else by low-rank differences."""
-        if length == 0.0:  # two changes of state at one time
+        """Propagate by eigenvalues in the base state, and by low-rank differences in other states."""
+        if length == 0.0:  # two simultaneous transitions
             return states
         stuck = self.contacts.sticks[interval]
         pulled = self.pull[:, self.contacts.rows[stuck]] * self.contacts.springs[stuck]
@@ -104,11 +104,11 @@ class LowRankFlow:
 
     @property
     def condition(self) -> float:
-        """Condition of the eigenvectors."""
+        """Condition number of the eigenvectors."""
         return float(np.linalg.norm(self.into, 1) * np.linalg.norm(self.out, 1))
 
     def _difference(self, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return U (2n, r) and V (r, 2n) of the state with this difference of stiffness from the base."""
+        """Return U (2n, r) and V (r, 2n) of a state whose stiffness differs by this matrix from the base state."""
         changed = np.flatnonzero(np.any(stiffness != 0.0, axis=2))
         contact, direction = np.divmod(changed, 3)
         own = self.gaps.reshape(-1, 3, self.gaps.shape[1])[contact]
@@ -123,7 +123,7 @@ class LowRankFlow:
         return np.exp(value * length), np.where(still, length, mean)
 
     def _times(self, function: ComplexArray, columns: FloatArray) -> FloatArray:
-        """Return a function of the base matrix, given by its eigenvalues, times columns."""
+        """Return a function of the base matrix, given by its values at the eigenvalues, times columns."""
         out = function.real[:, None] * columns
         out += function.imag[:, None] * columns[self.other]
         return np.asarray(out)
@@ -131,7 +131,7 @@ class LowRankFlow:
     def _transition(
         self, columns: FloatArray, rows: FloatArray, pulled: FloatArray, length: float
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Return the (2n, 2n) matrix of an interval and the (2n, m) effect of sliders; None where the nodes do not suffice."""
+        """Return the (2n, 2n) matrix of an interval and the (2n, m) effect of sliders; None if the nodes do not suffice."""
         n2, r = columns.shape
         nodes, weights = HYPERBOLA
         own, cross = self._resolvent(nodes / length)
@@ -154,7 +154,7 @@ class LowRankFlow:
         return added[:, :n2], added[:, n2:] + self._times(mean, pulled)
 
     def _resolvent(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return (nodes, 2n) the factors of the base resolvent on a column and on the other column of its pair."""
+        """Return the (nodes, 2n) factors of the base resolvent for a column itself and for its partner in a complex pair."""
         off = z[:, None] - self.rate
         inverse = 1.0 / (off * off + self.turn * self.turn)
         return off * inverse, np.asarray(self.turn * inverse, dtype=complex)
@@ -170,7 +170,7 @@ class LowRankFlow:
         return out.reshape(len(own), -1, rows.shape[1])
 
     def _room(self, place: int, shape: tuple[int, ...]) -> FloatArray:
-        """Return an array of this shape from reused memory; a new allocation would cost as much as filling it."""
+        """Return an array in reused memory; a new allocation would cost as much as filling it."""
         size = int(np.prod(shape))
         if self.rooms[place].size < size:
             self.rooms[place] = np.empty(size)
@@ -194,7 +194,7 @@ class LowRankFlow:
 
 
 def _real(matrices: ComplexArray) -> FloatArray:
-    """Return complex matrices (k, r, r) as real ones (k, 2 r, 2 r) for real and imaginary parts."""
+    """Convert complex matrices (k, r, r) to real ones (k, 2 r, 2 r) for real and imaginary parts."""
     real, imaginary = matrices.real, matrices.imag
     return np.concatenate(
         [np.concatenate([real, -imaginary], axis=2), np.concatenate([imaginary, real], axis=2)], axis=1
@@ -220,7 +220,7 @@ def _longest(contacts: ContactStates) -> FloatArray:
     base: FloatArray = contacts.stiffness[0].copy()
     lengths = np.diff(contacts.times)
     for c in np.flatnonzero(np.any(contacts.stiffness != base, axis=(0, 2, 3))):
-        # a few different states of many intervals: found by their bytes, sorted by their numbers
+        # many intervals have few distinct states: found by their bytes, sorted by their numbers
         states = contacts.stiffness[:, c].reshape(lengths.size, -1) + 0.0  # no negative zeros
         place: dict[bytes, int] = {}
         which = np.array([place.setdefault(row.tobytes(), len(place)) for row in states])
@@ -232,7 +232,7 @@ def _longest(contacts: ContactStates) -> FloatArray:
 
 
 def _real_form(values: ComplexArray, vectors: ComplexArray) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-    """Return real parts, imaginary parts with sign, the other one of each pair, and the real basis of real and imaginary parts."""
+    """Return real parts, signed imaginary parts, the partner of each in its pair, and the real basis of real and imaginary parts."""
     values, vectors = np.asarray(values, complex), np.asarray(vectors, complex)
     real, upper = np.flatnonzero(values.imag == 0.0), np.flatnonzero(values.imag > 0.0)
     first = np.arange(upper.size)
@@ -246,7 +246,7 @@ def _real_form(values: ComplexArray, vectors: ComplexArray) -> tuple[FloatArray,
 
 
 def _hyperbola() -> tuple[ComplexArray, ComplexArray]:
-    """Return nodes and weights, exponential included, of two trapezoidal rules in the upper half plane, of which the real part is taken."""
+    """Return nodes and weights, with the exponential, of two trapezoidal rules in the upper half plane; the real part of the sum counts."""
     at = np.concatenate([np.arange(NODES), np.arange(NODES) + 0.5])
     turned = 1j * STEP * at - ANGLE
     z = WIDTH * (1.0 + np.sin(turned))

@@ -13,10 +13,10 @@ from stickslip.model.structure import Structure
 
 @dataclass(frozen=True, eq=False)
 class ModalStates:
-    """``u = basis p``, ``u̇ = ω basis (speed w)`` and the states (p, w), in the time τ = ωt.
+    """Modal states (p, w) with ``u = basis p``, ``u̇ = ω basis (speed w)``, in the time τ = ωt.
 
-    The basis are the mass-normalised modes with all contacts stuck, so that slip and lift-off reduce the stiffness. `speed` scales both
-    halves of a state to similar size.
+    The basis consists of the mass-normalised modes with all contacts stuck; slip and lift-off reduce the stiffness. `speed` scales both halves
+    of a state to similar size.
     """
 
     omega: float
@@ -59,7 +59,7 @@ def modal_states(structure: Structure, gap_operator: Matrix, springs: FloatArray
     springs
         (3 n_contacts,) stiffness of sticking contacts, N/m.
     omega
-        rad/s.
+        Frequency of the motion, rad/s.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Monodromy matrix: matrix exponentials between located transitions, projections at them, and kicks where tangents are known on samples only.
+"""Monodromy matrix: matrix exponentials between located transitions, projections at transitions, impulses of sampled tangents.
 
-A kick acts at each sample, and between samples everything is propagated exactly (the splitting of Strang 1968): the error is of second
-order in the step. The means of the tangents over the period are springs, and part of what is propagated.
+Laws without located transitions act by an impulse at each sample, with exact propagation between samples (the splitting of Strang 1968); the
+error is of second order in the step. The means of their tangents over the period are springs of the propagated structure.
 
-Within a block the gaps follow by small matrices from the states at its beginning and from the forces at earlier samples; large matrices
-are multiplied once per block. The result equals that of single samples up to rounding.
+Within a block of samples, small matrices give the gaps from the initial states and from the forces at earlier samples; large matrices are
+multiplied once per block. The result agrees with single samples up to rounding.
 """
 
 from dataclasses import dataclass
@@ -25,19 +25,19 @@ from stickslip.response.stability.flow_map.sampled_tangents import SampledTangen
 from stickslip.response.time.sectors import InTime
 from stickslip.response.time.stepping.contact_step import inner
 
-MAX_SAMPLES = 32  # in a block; 8 to 64 cost the same within a tenth, one contact on 60 modes
+MAX_SAMPLES = 32  # in a block; for one contact on 60 modes, 8 to 64 cost the same within a tenth
 
 
 @dataclass(slots=True)
 class Disturbance:
-    """The states as linear functions of those at the beginning of the period."""
+    """States as linear functions of the states at the beginning of the period."""
 
     motion: FloatArray  # (2n, k)
     sliders: FloatArray  # (n_sliders, k)
 
 
 class Sliders:
-    """Operators that set slider positions from the gaps (3 n_contacts, k) of the first k states."""
+    """Operators for slider positions, from the gaps (3 n_contacts, k) of the first k states."""
 
     def __init__(self, gaps: FloatArray, contacts: ContactStates) -> None:
         self.contacts = contacts
@@ -52,10 +52,10 @@ class Sliders:
 
 
 def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
-    """Return the monodromy matrix where all transitions are located.
+    """Return the monodromy matrix of contacts with located transitions only.
 
-    The states are those of the structure and the positions of sliders that stick at the beginning of the period. The period begins at the
-    transition after which the fewest sliders stick; the non-zero multipliers do not depend on this choice.
+    The states belong to the structure and to sliders that stick at the beginning of the period. The period begins at the transition after
+    which the fewest sliders stick; the non-zero multipliers do not depend on this choice.
     """
     flow, count = flow_of(modes, contacts), len(contacts.times) - 1
     places = Sliders(flow.gaps, contacts)
@@ -72,10 +72,10 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
 
 
 def share_of_monodromy(modes: ModalStates, contacts: ContactStates, wheel: InTime) -> FloatArray | None:
-    """Return the monodromy matrix of one share of the period with renumbered sectors; None where the motion has no shares.
+    """Return the monodromy matrix of one share of the period with renumbered sectors; None if the motion has no shares.
 
-    A travelling wave repeats its first share of the period in other sectors, so the multipliers of the period are those of the share to the
-    power of the number of shares. The share begins in the middle of the longest interval.
+    A travelling wave repeats its first share of the period in other sectors, so the multipliers of the period are powers of the multipliers
+    of the share. The share begins in the middle of the longest interval.
     """
     times, count = contacts.times, len(contacts.times) - 1
     sliders = contacts.rows.size
@@ -114,14 +114,14 @@ def identity(n: int, held: BoolArray, more: int) -> Disturbance:
 
 
 def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list[FloatArray]:
-    """Return the samples of each interval between transitions, equally spaced from its beginning on.
+    """Return equally spaced samples of each interval between transitions, from its beginning on.
 
     Parameters
     ----------
     contacts
         Contacts with located transitions.
     samples
-        Least number of samples in the period.
+        Smallest number of samples in the period.
     halves
         Multiple of half this number; twice the value halves each step.
     """
@@ -134,13 +134,13 @@ def sample_times(contacts: ContactStates, samples: int, halves: int = 2) -> list
 
 
 class _Kicks:
-    """Sampled contacts: their states, and the effect of their forces on the motion."""
+    """States of sampled contacts, and the effect of their impulses on the motion."""
 
     def __init__(self, modes: ModalStates, tangents: SampledTangents, weights: FloatArray, size: int) -> None:
         n, most = tangents.kept.shape
         self.modes, self.jac = modes, tangents.jac
         self.by_rate = bool(np.any(tangents.jac[:, :, :, 3:6] != 0.0))
-        self.alone = np.ascontiguousarray(np.delete(tangents.jac, [3, 4, 5], axis=3))  # where no rate acts
+        self.alone = np.ascontiguousarray(np.delete(tangents.jac, [3, 4, 5], axis=3))  # without rates
         self.factors = weights
         index = 3 * tangents.contacts[:, None] + np.arange(3)
         self.gaps = modes.gaps[index.reshape(-1)]  # (3 n, n_modes)
@@ -151,13 +151,13 @@ class _Kicks:
         self.springs = self.weights * own_stiffness.mean(axis=0).reshape(-1, 1)
         self.real = tangents.kept
         self.states = np.zeros((n, most, size))
-        self.before = np.zeros((n, 3, size))  # gaps at the sample before
+        self.before = np.zeros((n, 3, size))  # gaps at the previous sample
         own = int(self.real.sum())
         self.states[self.real, size - 3 * n - own : size - 3 * n] = np.eye(own)
         self.before[:, :, size - 3 * n :] = np.eye(3 * n).reshape(n, 3, 3 * n)
 
     def advance(self, first: int, shares: FloatArray, step: FloatArray, states: FloatArray) -> FloatArray:
-        """Return the states after the impulses at the samples from `first` on and a step after each; `first` counts shares of the period."""
+        """Return the states after impulses at the samples from `first` on, and a step after each; `shares` are step lengths over the period."""
         if self.by_rate:
             for i, share in enumerate(shares, first):
                 self.kick(i, share, states)
@@ -179,7 +179,7 @@ class _Kicks:
         return states
 
     def kick(self, sample: int, share: float, motion: FloatArray) -> None:
-        """Change velocities and states at a sample; velocities decay during the impulse."""
+        """Change velocities and law states by an impulse at a sample, during which velocities decay."""
         n, half = len(self.states), self.modes.n
         gap = self.gaps @ motion[:half]
         now = gap.reshape(n, 3, -1)
@@ -198,12 +198,12 @@ class _Kicks:
 
     @property
     def rows(self) -> FloatArray:
-        """Existing states and gaps at the last sample, (n_states, k)."""
+        """Existing law states, and gaps at the last sample, (n_states, k)."""
         return np.vstack([self.states[self.real], self.before.reshape(-1, self.before.shape[2])])
 
 
 def _decayed(x: FloatArray) -> FloatArray:
-    """Return ``(1 - exp(-X)) / X``, the mean of a force that decays by its own effect, from a rational function of X / 2ᵏ."""
+    """Return ``(1 - exp(-X)) / X``, the mean of a decaying force, from a rational function of X / 2ᵏ."""
     halvings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(x, 1)), 1e-9)))) + 2)
     part, one = x / 2**halvings, np.eye(len(x))
     square = part @ part
@@ -217,7 +217,7 @@ def _decayed(x: FloatArray) -> FloatArray:
 def sampled_monodromy(
     modes: ModalStates, contacts: ContactStates, times: list[FloatArray], tangents: SampledTangents, weights: FloatArray
 ) -> FloatArray:
-    """Return the derivative of all states after a period by those before.
+    """Return the monodromy matrix of contacts with located transitions and with sampled tangents.
 
     Parameters
     ----------
@@ -266,11 +266,11 @@ class Block:
     gaps
         (samples, m, N) gaps of the sampled contacts without forces.
     gap_response
-        (samples, m, m) gaps one, two and more samples after a unit force.
+        (samples, m, m) gaps at successive samples after a unit force.
     step
         (N, N) transition matrix of the block.
     force_effect
-        (N, samples m) effect of forces at the samples on the states after the last one.
+        (N, samples m) effect of forces at the samples on the final states.
     """
 
     gaps: FloatArray
@@ -280,7 +280,7 @@ class Block:
 
 
 def _blocks(step: FloatArray, gaps: FloatArray, push: FloatArray, count: int) -> list[Block]:
-    """Return blocks with `count` samples in total, the same block as often as possible.
+    """Return blocks with `count` samples in total, with as many equal blocks as possible.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def _add(factor, row, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
-    """Add the effect of forces at earlier samples to the gaps of the i-th."""
+    """Add the effect of forces at earlier samples to the gaps of the i-th sample."""
     for j in range(i):
         for a in range(gaps.shape[0]):
             for b in range(gaps.shape[0]):
@@ -329,7 +329,7 @@ def _add_effects(gap_response, forces, i, gaps):  # type: ignore[no-untyped-def]
 
 @inner
 def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[no-untyped-def]
-    """Compute forces (3, k) and new states (s, k) of one contact from gaps, states and the gaps before, `known`."""
+    """Compute forces (3, k) and new states (s, k) of one contact from gaps, states and previous gaps in `known`."""
     for d in range(3):
         forces[d] = 0.0
         _add(share * springs[d], known[d], forces[d])
@@ -344,9 +344,10 @@ def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[n
 def _run(contacts, shares, gap_response, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
     """Apply the contact impulses at each sample of a block.
 
-    `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and the gaps before, factors (n,) of the forces, and
-    springs (3 n,) that are part of the propagation; `shares` (samples,) those of the period. In place: `gaps` (samples, 3 n, k) without forces of the block
-    become those with them, `states` (n, s, k), `before` (n, 3, k); `forces` (samples, 3 n, k) is filled; `known` (6 + s, k) is room.
+    `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and previous gaps, the factors (n,) of the forces,
+    and the springs (3 n,) in the propagation; `shares` (samples,) are step lengths over the period. Changed in place are `gaps` (samples, 3 n, k), to which
+    the effect of the block's forces is added, `states` (n, s, k) and `before` (n, 3, k); `forces` (samples, 3 n, k) is filled; `known` (6 + s, k) is a
+    work array.
     """
     jac, weights, springs = contacts
     kept = states.shape[1]

@@ -1,8 +1,8 @@
-"""Propagation of disturbances between transitions: the matrix exponential, to rounding.
+"""Propagation of disturbances between transitions: matrix exponential to rounding accuracy.
 
-Reduced structures are stiff: their fastest modes vibrate a thousand times in a period. Short intervals apply the Taylor series of the
-exponential to the disturbances. Longer intervals are halved until a rational approximation is exact to rounding and then squared (Higham
-2005). Additional columns carry the constant force of sticking sliders.
+Reduced structures are stiff: their fastest modes vibrate a thousand times in a period. In short intervals, the Taylor series of the
+exponential acts on the disturbances. Longer intervals are halved until a rational approximation is exact to rounding, which is then squared
+(Higham 2005). Additional columns contain the constant force of sticking sliders.
 """
 
 import numpy as np
@@ -10,10 +10,10 @@ from scipy.linalg.lapack import dgesv
 
 from stickslip.arrays import FloatArray
 
-SHORT = 1.0  # |A| times the length up to which the series costs less than a rational function
-ACCURACY = 1e-14  # of the last term of the series, relative to the result
+SHORT = 1.0  # |A| times the length, up to which the series costs less than a rational function
+ACCURACY = 1e-14  # last term of the series, relative to the result
 TOO_FAST = "the linear motion between contacts' changes is too fast for a number"
-RATIONAL = 5.37  # |A| times the length up to which the rational function is exact to rounding
+RATIONAL = 5.37  # |A| times the length, up to which the rational function is exact to rounding
 NUMERATOR = (
     64764752532480000.0,
     32382376266240000.0,
@@ -42,7 +42,7 @@ def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: Floa
     states
         (2n, k).
     pull, sliders
-        (n, m) and (m, k) operator and positions of sliders, constant over the interval.
+        (n, m) operator of the sliders and (m, k) their positions, constant over the interval.
     length
         Length of the interval, rad.
     """
@@ -55,7 +55,7 @@ def propagate(a: FloatArray, states: FloatArray, pull: FloatArray, sliders: Floa
 
 
 def transition(a: FloatArray, pull: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the (2n, 2n) transition matrix of an interval and the (2n, m) effect of the sliders.
+    """Return the (2n, 2n) transition matrix of an interval, and the (2n, m) effect of the sliders.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def transition(a: FloatArray, pull: FloatArray, length: float) -> tuple[FloatArr
         powers = a2, a4, a4 @ a2
         # roots of powers come closer to the spectral radius than norms do (Al-Mohy & Higham 2009)
         size = length * max(float(np.linalg.norm(m, 1)) ** (1.0 / k) for m, k in zip(powers[1:], (4, 6), strict=True))
-        if not size < 1.0 / np.finfo(float).eps:  # not a digit of the phase is left
+        if not size < 1.0 / np.finfo(float).eps:  # no digit of the phase is significant
             raise FloatingPointError(TOO_FAST)
         halvings = max(0, int(np.ceil(np.log2(max(size, RATIONAL) / RATIONAL))))
         part = length / 2**halvings
@@ -113,7 +113,7 @@ def _series(a: FloatArray, rate: FloatArray, length: float) -> FloatArray:
 def _rational(
     a: FloatArray, powers: tuple[FloatArray, ...], part: float, columns: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the Padé approximant of order 13 of ``exp(part A)``, and that of ``(exp(part A) - 1) / (part A)`` times the columns.
+    """Return the Padé approximants of order 13 of ``exp(part A)``, and of ``(exp(part A) - 1) / (part A)`` times the columns.
 
     The `powers` are A², A⁴ and A⁶.
     """

@@ -1,8 +1,8 @@
-"""Tangents of contact laws without located transitions, on samples of a period.
+"""Tangents of contact laws without located transitions, at samples of a period.
 
-Hysteresis reverses where a gap does. A step across a reversal is divided there, with an interpolated gap; an undivided step would use the
-slope of one side for both. Velocity-dependent friction is steep where the velocity passes zero; its tangents are integrated adaptively
-over the steps on both sides of a sample.
+Hysteresis reverses where a gap reverses. A step across a reversal is divided there, with an interpolated gap, since both sides have different
+slopes. Velocity-dependent friction is steep where the velocity passes zero; its tangents are integrated adaptively over the steps on both
+sides of a sample.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,31 +16,31 @@ from stickslip.contact.law import ContactLaw
 from stickslip.contact.law_steps import steps_along, tangents_at
 
 MOST_PERIODS = 200
-PLAIN = 2  # periods marched before the first correction of the state
-SETTLED = 1e-12  # change of the state over a period, relative to its size
-KEPT = 1e-10  # singular value below which a direction keeps its memory for ever
+PLAIN = 2  # periods before the first Newton correction of the state
+SETTLED = 1e-12  # relative change of the state over a period that ends the iteration
+KEPT = 1e-10  # relative singular value below which a direction never forgets
 EQUAL = 1e-12  # difference of derivatives that is rounding
-DISPLACED = 1e-9  # of a slider from its first place, relative to the largest gap
-ON_CIRCLE = 1e-6  # distance of a root from the unit circle that counts as none
+DISPLACED = 1e-9  # displacement of a slider from its initial position, relative to the largest gap
+ON_CIRCLE = 1e-6  # distance of a root from the unit circle that is rounding
 
-ACCURACY = 1e-8  # of the integral over a piece, relative to that over the period
+ACCURACY = 1e-8  # error of the integral over a part, relative to the integral over the period
 MOST_HALVINGS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class SampledTangents:
-    """Derivatives of force and new state by gap, gap velocity, old state and the gap at the sample before.
+    """Derivatives of force and new state by gap, gap velocity, old state and the gap at the previous sample.
 
     Attributes
     ----------
     contacts
         (n,) indices of the contacts.
     kept
-        (n, s) which law states are states of the motion: forces depend on them, and they change in the period.
+        (n, s) whether a law state is a state of the motion: forces depend on it, and it changes in the period.
     jac
         (samples, n, 3 + s, 9 + s).
     resting, grazing
-        (n,) number of sliders that stick for the whole period, and of these that have moved from their initial position.
+        (n,) number of sliders that stick for the whole period, and number of these that have moved from their initial position.
     """
 
     contacts: IntArray
@@ -52,7 +52,7 @@ class SampledTangents:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The gaps of contacts at `times` in [0, 4π), ascending: (2H+1, n, 3) Fourier coefficients in m, and ω in rad/s."""
+    """Gaps of contacts at ascending `times` in [0, 4π): (2H+1, n, 3) Fourier coefficients in m, and ω in rad/s."""
 
     times: FloatArray
     polynomials: FloatArray
@@ -60,12 +60,12 @@ class Path:
 
 
 def sampled_tangents(laws: Sequence[ContactLaw], contacts: IntArray, path: Path) -> SampledTangents:
-    """March each law along its gaps until its state repeats and return the tangents of the last period.
+    """Evaluate each law along its gaps until its state repeats; return the tangents of the last period.
 
     Parameters
     ----------
     laws, contacts
-        (n,) laws and the contacts they belong to.
+        (n,) laws and indices of their contacts.
     path
         Gaps of the contacts over one period.
     """
@@ -88,12 +88,12 @@ def sampled_tangents(laws: Sequence[ContactLaw], contacts: IntArray, path: Path)
 
 
 def _unmoved(jac: FloatArray, size: int) -> BoolArray:
-    """Return which states stay constant over the period for any disturbance."""
+    """Return whether each state stays constant over the period for any disturbance."""
     return np.asarray(np.all(np.abs(jac[:, 3:] - np.eye(size, 9 + size, 6)) <= EQUAL, axis=(0, 2)))
 
 
 def _felt(jac: FloatArray, size: int) -> BoolArray:
-    """Return the states on which a force depends, directly or through others."""
+    """Return whether a force depends on each state, directly or through other states."""
     by_state = np.any(jac[:, :, 6 : 6 + size] != 0.0, axis=0)
     felt = np.any(by_state[:3], axis=0)
     for _ in range(size):
@@ -112,7 +112,7 @@ def _turns(polynomial: FloatArray) -> FloatArray:
 
 
 class _Steps:
-    """The steps of one contact over a period: one to each sample, in parts where a tangential gap turns between two samples."""
+    """Steps of one contact over a period, one to each sample, divided where a tangential gap reverses between two samples."""
 
     def __init__(self, law: ContactLaw, path: Path, j: int) -> None:
         self.law, self.parameters = law, np.asarray(law.parameters(), dtype=float)
@@ -130,13 +130,13 @@ class _Steps:
         basis, slope = _fourier_basis(self.times, len(polynomials))
         self.gap = np.ascontiguousarray(basis @ polynomials)
         self.velocity = np.ascontiguousarray(path.omega * (slope @ polynomials))
-        # where between the two samples each step ends
+        # position of each part's end between its two samples
         index = np.searchsorted(path.times, self.times)
         left = np.concatenate([[before], path.times])[index]
         self.share = (self.times - left) / (path.times[index] - left)
 
     def settled(self) -> tuple[FloatArray, FloatArray]:
-        """Return the (samples, 3 + s, 9 + s) tangents in the periodic state, and this; NaN where a step gave no numbers."""
+        """Return the (samples, 3 + s, 9 + s) tangents in the periodic state, NaN if a step is not finite, and this state."""
         state = np.array(self.law.initial_state(), dtype=float)
         if np.any(np.isnan(state)):
             state = self._period(state, len(self.times) - 1)[0]
@@ -155,12 +155,12 @@ class _Steps:
         return jac, state
 
     def displaced(self, state: FloatArray) -> BoolArray:
-        """Return which states do not have their first value."""
+        """Return whether each state differs from its initial value."""
         away = np.abs(state - np.asarray(self.law.initial_state(), dtype=float))
         return np.asarray(away > DISPLACED * float(np.max(np.abs(self.gap))))
 
     def _integrate(self, jac: FloatArray) -> None:
-        """Put means over the steps in place of the tangents at samples: by the velocity, and by the gap where there is no state."""
+        """Replace the tangents at samples by means over the steps: by the velocity, and for laws without states also by the gap."""
         columns = slice(0, 6) if not self.size else slice(3, 6)
         before = np.concatenate([[self.path.times[-1] - 2 * np.pi], self.times[:-1]])
         ends = np.column_stack([before, self.times])
@@ -182,7 +182,7 @@ class _Steps:
         return out
 
     def _corrected(self, state: FloatArray, new: FloatArray, jac: FloatArray) -> FloatArray:
-        """Return the state that Newton's method expects to repeat, without directions that never forget."""
+        """Return the state after a Newton correction towards a periodic state, without directions that never forget."""
         kept = np.eye(self.size)
         for step in jac:
             kept = step[3:, 6 : 6 + self.size] @ kept
@@ -190,7 +190,7 @@ class _Steps:
         return np.asarray(state + correction if np.all(np.isfinite(correction)) else new)
 
     def _period(self, state: FloatArray, first: int = 0) -> tuple[FloatArray, FloatArray]:
-        """Take the law through a period; return the state at its end and the tangents of whole steps."""
+        """Evaluate the law over a period; return the final state and the tangents of whole steps."""
         new, s = np.array(state, dtype=float), self.size
         whole = np.zeros((len(self.samples), 3 + s, 9 + s))
         steps_along(
@@ -221,10 +221,9 @@ def _fourier_basis(tau: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
 def _hat_integrals(
     tangents: Callable[[FloatArray, IntArray], FloatArray], ends: FloatArray, step: IntArray, samples: FloatArray
 ) -> FloatArray:
-    """Return means of tangents about each sample with a weight that falls linearly to zero at the neighbouring samples.
+    """Return means of tangents about each sample, with a weight that decreases linearly to zero at the neighbouring samples.
 
-    A force much shorter than a step acts as two impulses with the same sum and the same mean time. Parts are halved until Simpson's rule
-    converges.
+    A force much shorter than a step becomes two impulses with the same sum and mean time. Parts are halved until Simpson's rule converges.
 
     Parameters
     ----------
@@ -235,7 +234,7 @@ def _hat_integrals(
     step
         (n_parts,) sample at the end of the step of each part.
     samples
-        (n_samples,) times; the first step begins at the last sample of the period before.
+        (n_samples,) times; the first step begins at the last sample of the previous period.
     """
     lengths = np.diff(samples, prepend=samples[-1] - 2 * np.pi)
     part, left, right = np.arange(len(ends)), ends[:, 0], ends[:, 1]

@@ -1,1 +1,1 @@
-"""Hill's method: Floquet exponents from the harmonic balance itself."""
+"""Hill's method: Floquet exponents from the harmonic balance."""

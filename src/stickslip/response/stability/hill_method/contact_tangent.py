@@ -1,8 +1,8 @@
 """Contact forces under a disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of the gaps, along a motion with known transitions.
 
 The forces are ``e^{στ} Σ_h F_h e^{ihτ}``. The matrix from G to F depends on the exponent σ: a slider that sticks from τ_0 on keeps the
-displacement of the disturbance at τ_0 while the disturbance grows. The tangent of the periodic motion is the matrix at σ = 0 and gives
-wrong exponents elsewhere.
+displacement of the disturbance at τ_0 while the disturbance grows. The Jacobian of the harmonic balance uses the matrix at σ = 0, which
+gives wrong exponents elsewhere.
 """
 
 from dataclasses import dataclass, field
@@ -13,18 +13,18 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.flow_map.contact_states import ContactStates
 
-SMALL = 1e-3  # |z L| below which (1 - e^{-zL}) / z is taken from its series
-UNCHANGED_STIFFNESS_SHARE = 1e-12  # of the largest stiffness: what changes less does not change
+SMALL = 1e-3  # |z L| below which (1 - e^{-zL}) / z is evaluated by its series
+UNCHANGED_STIFFNESS_SHARE = 1e-12  # change of a stiffness, relative to the largest, below which it counts as constant
 
 
 @dataclass(frozen=True, eq=False)
 class Rests:
-    """The stick intervals of the sliders of one contact.
+    """Stick intervals of the sliders of one contact.
 
     Attributes
     ----------
     own, normal
-        (q,) port of each slider, and port of the normal gap (its own where the normal gap has no influence).
+        (q,) port of each slider, and port of the normal gap (the slider's own if the normal gap has no influence).
     by_normal
         (q,) derivative of the slider position by the normal gap at the beginning of stick.
     stiffness
@@ -43,16 +43,16 @@ class Rests:
 
 @dataclass(frozen=True, eq=False)
 class ContactTangent:
-    """Tangent of one contact over a period, relative to springs that represent its mean.
+    """Tangent of one contact over a period, relative to mean springs.
 
     Attributes
     ----------
     ports
-        (m,) ports, among those of all contacts, at which it differs from these springs at any time.
+        (m,) indices, among the ports of all contacts, at which the contact differs from the mean springs at any time.
     times
         (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same transition a period later.
     changes
-        (n_intervals, m, m) stiffness in each interval minus the springs, N/m, with sticking sliders at rest.
+        (n_intervals, m, m) stiffness in each interval minus the mean springs, N/m, with fixed sticking sliders.
     rests
         Stick intervals of its sliders.
     """
@@ -90,7 +90,7 @@ class ContactTangent:
         return np.asarray(found.reshape(-1, *self.changes.shape[1:]))
 
     def _held(self, sigma: complex, harmonics: IntArray) -> ComplexArray:
-        """Return the (k, m, q) forces that a unit displacement of each slider relieves while it sticks."""
+        """Return the (k, m, q) forces relieved by a unit displacement of each slider while it sticks."""
         rests, h = self.rests, harmonics[:, None]
         share = rests.stiffness / PERIOD * _lasting(sigma + 1j * h, rests.length)
         out = np.zeros((harmonics.size, self.ports.size, rests.own.size), dtype=complex)
@@ -98,7 +98,7 @@ class ContactTangent:
         return out
 
     def _placed(self, harmonics: IntArray) -> ComplexArray:
-        """Return the (q, k, m) slider positions at the beginning of stick, over ``e^{σ τ_0}``, by the harmonics of the disturbance."""
+        """Return the (q, k, m) derivatives of slider positions at the beginning of stick, over ``e^{σ τ_0}``, by the disturbance's harmonics."""
         rests, each = self.rests, np.arange(self.rests.own.size)
         turns = np.exp(1j * harmonics * rests.start[:, None])
         out = np.zeros((each.size, harmonics.size, self.ports.size), dtype=complex)
@@ -108,14 +108,14 @@ class ContactTangent:
 
 
 def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, list[ContactTangent]]:
-    """Return the tangent of the contacts for a disturbance, from their states over a period.
+    """Return the tangents of the contacts for a disturbance, from their states over a period.
 
     Returns
     -------
     springs
-        (3 n_contacts,) stiffness of the springs that represent their mean, N/m.
+        (3 n_contacts,) stiffness of the mean springs, N/m.
     ports
-        Rows of the gap operator in which some contact differs from them.
+        Rows of the gap operator in which a contact differs from its mean springs.
     tangents
         Tangents of these contacts.
     """
@@ -139,7 +139,7 @@ def contact_tangents(contacts: ContactStates) -> tuple[FloatArray, IntArray, lis
 
 
 def _rests(contacts: ContactStates, contact: int, own: IntArray) -> Rests:
-    """Return all stick intervals of the sliders of a contact within a period; `own` are its directions that are ports."""
+    """Return all stick intervals of a contact's sliders within a period; `own` are its directions that are ports."""
     lengths, count = np.diff(contacts.times), len(contacts.times) - 1
     place = np.searchsorted(own, contacts.rows % 3)
     found = []

@@ -1,4 +1,4 @@
-"""Hill's method, exact for friction; for a wheel against every wave, on one sector."""
+"""Hill's method, exact for friction; for a wheel, disturbances of every wave on one sector."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -23,25 +23,25 @@ from stickslip.response.stability.missing_harmonics import corrected, more_harmo
 from stickslip.response.stability.waves import WaveDisturbance
 from stickslip.response.system import System
 
-# harmonics of disturbances: so many times those of the motion, and more, within the limits, and few enough for the rows
+# highest harmonic of disturbances: FACTOR times the highest harmonic of the motion plus MORE, within the limits below
 HARMONICS_FACTOR, HARMONICS_MORE = 2, 3
 MIN_HILL_HARMONICS, MAX_HILL_HARMONICS = 8, 20
 MAX_ROWS = 1300
 MIN_HARMONICS_OF_MANY_ROWS = 5
-# rows up to which harmonics are added until every mode rings in one
+# rows up to which harmonics are added until every mode resonates in one
 MAX_RINGING_ROWS = 400
-# rows up to which harmonics are doubled where those beyond matter, and added until modes ring that contacts may make grow
+# rows up to which harmonics are doubled while higher ones matter, and added until every mode that contacts may destabilise resonates in one
 MAX_DOUBLED_ROWS = 700
-# rows up to which all waves of a wheel are compared with those of the motion as it was solved; of larger ones those that grow most
+# rows up to which all waves of a wheel are compared with the motion as solved; of larger wheels, the fastest growing waves
 MAX_ROWS_OF_COMPARED_WAVES = 700
 COMPARED_WAVES = 3
-# relative size from which a wave's exponent counts as one of the largest: the others take the largest change among these
+# modulus over the largest, above which a multiplier counts as one of the largest; without comparison it takes the largest change of its group
 NEAR_LARGEST_SHARE = 0.95
-# of a multiplier: what modes may do that ring above all harmonics that are solved; measured 9e-5
+# relative error of a multiplier from modes that resonate above all solved harmonics; measured 9e-5
 RINGING_ABOVE = 3e-4
-# real part from which exponents decide, and what harmonics beyond may change in these
+# real part above which exponents decide, and the largest allowed change of these by higher harmonics
 DECIDING_REAL_PART, DECIDED_CHANGE = -0.03, 3e-3
-FURTHER_MOTIONS = 2  # motions with more harmonics that are tried where a verdict stays open
+FURTHER_MOTIONS = 2  # motions with more harmonics to try if the verdict stays open
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +51,12 @@ class HillStability:
     Parameters
     ----------
     stability
-        Verdict, and the multipliers near the unit circle and outside.
+        Verdict, and the multipliers near and outside the unit circle.
     disturbance
-        The disturbance whose multiplier decides; None if there is none near the unit circle.
+        Disturbance of the deciding multiplier; None without a multiplier near the unit circle.
     missing
-        Number of multipliers outside the unit circle that the winding of the determinant counts and the search did not find; None if
-        they could not be counted.
+        Number of multipliers outside the unit circle that were counted by the winding of the determinant but not found; None if they could
+        not be counted.
     """
 
     stability: Stability
@@ -80,22 +80,22 @@ class HillStability:
 
 @by_one_thread
 def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept) -> HillStability:
-    """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
+    """Return the stability of a solved point of a forced response; for a tuned wheel, against disturbances of every wave.
 
-    As in `stability`, the multipliers are those of the motion with more harmonics, and their change is part of the errors. Structural
-    damping and frequency-dependent aerodynamic coefficients act as in the balance.
+    As in `stability`, the multipliers belong to the motion with more harmonics, and their change is part of the errors. Structural damping
+    and frequency-dependent aerodynamic coefficients act as in the balance.
 
     Parameters
     ----------
     problem, point
         As in `stability`.
     keep
-        Cache of intermediate results by their inputs, from which an interrupted examination continues.
+        Cache of intermediate results by their inputs, from which an interrupted computation continues.
 
     Raises
     ------
     InputError
-        If the point did not converge, a law's transitions are not located, or a tuned wheel has not all its waves.
+        If the point did not converge, a law's transitions are not located, or a tuned wheel lacks waves.
     """
     if not point.converged:
         raise input_error(
@@ -152,13 +152,13 @@ def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int 
     omega
         Frequency of the motion, rad/s.
     order
-        Highest harmonic of the disturbances that is solved; higher ones act to first order. None: chosen from that of the motion.
+        Highest solved harmonic of the disturbances; higher ones act to first order. None: chosen from the harmonics of the motion.
 
     Raises
     ------
     InputError
-        If a contact is rigid, a law's transitions are not located, rounding makes more of these than there can be, or a tuned wheel
-        has not all its waves.
+        If a contact is rigid, a law's transitions are not located, rounding makes more transitions than possible, or a tuned wheel lacks
+        waves.
     """
     hill, _ = _prepared(system, gaps, omega, order)
     if hill is None:
@@ -171,7 +171,7 @@ def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int 
 
 
 def _refined(hill: Hill) -> tuple[Hill, Exponents]:
-    """Return the exponents with enough harmonics for the deciding exponent to be converged, if the limits allow."""
+    """Return the problem and its exponents with enough harmonics for convergence of the deciding exponent, if the limits allow."""
     found = exponents(hill)
     while True:
         deciding = np.max(found.errors[found.values.real > DECIDING_REAL_PART], initial=0.0)
@@ -201,7 +201,7 @@ def _of_point(
 def _prepared(
     system: System, gaps: ComplexArray, omega: float, order: int | None
 ) -> tuple[Hill | None, ContactStates | None]:
-    """Return Hill's problem of a motion and the states of its contacts; None where these are not known."""
+    """Return Hill's problem of a motion and the states of its contacts; None if these are unknown."""
     side, interface = system.structure, system.interface
     if side.wheel is not None and not side.wheel.has_every_wave:
         raise input_error(
@@ -224,7 +224,7 @@ def _prepared(
 
 
 def _order(hill: Hill, motion: int) -> int:
-    """Return the number of solved harmonics: each mode, or each that may grow, resonates in one of them if that is affordable."""
+    """Return the highest solved harmonic: if affordable, each mode, or each mode that may grow, resonates in a solved harmonic."""
     ports = max(hill.side.ports.size, 1)
     ratios = hill.side.modes(0, 0).ratios
     least = min(max(HARMONICS_FACTOR * motion + HARMONICS_MORE, MIN_HILL_HARMONICS), MAX_HILL_HARMONICS)
@@ -237,7 +237,7 @@ def _order(hill: Hill, motion: int) -> int:
 
 
 def _changes(found: Exponents, solved: Hill) -> FloatArray:
-    """Return the change of each multiplier from that of the motion as solved; for a large wheel from a few waves."""
+    """Return the change of each multiplier against the motion as solved; for a large wheel, estimated from a few waves."""
     waves = solved.side.waves
     if waves <= COMPARED_WAVES or solved.rows <= MAX_ROWS_OF_COMPARED_WAVES:
         return _distances(found, exponents(solved, segments_of(solved)), solved)
@@ -256,7 +256,7 @@ def _changes(found: Exponents, solved: Hill) -> FloatArray:
 def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
     """Return the distance of each multiplier from the nearest other one of the same wave, for any shift of the harmonic."""
     own, theirs = found.multipliers, other.multipliers
-    out = np.abs(own)  # one that was not there has come from far left
+    out = np.abs(own)  # a new multiplier counts as changed from zero
     for i, wave in enumerate(found.waves):
         waves = [hill.side.wave_of(int(wave), turn) for turn in (-1, 0, 1)]
         out[i] = np.min(np.abs(theirs[np.isin(other.waves, waves)] - own[i]), initial=out[i])
@@ -270,7 +270,7 @@ def _judged(found: Exponents, change: FloatArray, states: ContactStates, hill: H
     if np.any(ratios[np.isfinite(ratios)] > hill.order) and hill.tangents:
         errors = errors + RINGING_ABOVE * np.abs(values)
     if found.missing is None or found.missing:
-        # what was not found does not make those stable that are known to grow
+        # missing multipliers cannot stabilise a motion with a known growing one
         errors = np.where(np.abs(values) > 1.0, errors, np.inf)
         if not values.size:
             values, errors = np.array([np.nan + 0j]), np.array([np.inf])

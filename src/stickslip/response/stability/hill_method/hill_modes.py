@@ -1,7 +1,7 @@
 """Modes of the dynamic stiffness of each harmonic, for a disturbance with a complex exponent.
 
-The modes are those with mean springs in place of the contacts. Viscous damping may couple them; loss factors and aerodynamic forces act
-on them as in the harmonic balance.
+The modes are computed with mean springs in place of the contacts. Viscous damping may couple them; loss factors and aerodynamic forces act
+as in the harmonic balance.
 """
 
 from dataclasses import dataclass, replace
@@ -16,29 +16,29 @@ from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.response.system import System
 
-RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
-COUPLED = 1e-9  # of the largest entry: what couples modes less does not
+RAISED = 8  # largest number of fourfold increases of the mass weight α that makes the stiffness definite
+COUPLED = 1e-9  # coupling of modes, relative to the largest entry, that is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class HillModes:
-    """The modes ``u = Φ q`` of the structure of one harmonic, ``Φᴴ(K + α M)Φ = 1``, scaled by the frequency of the motion.
+    """Modes ``u = Φ q`` of the structure of one harmonic, with ``Φᴴ(K + α M)Φ = 1``, scaled by the frequency of the motion.
 
     Attributes
     ----------
     stiffness, mass
-        (n,) of each mode, the mass times ω².
+        (n,) of each mode; the mass times ω².
     damping, rest, loss
-        (n, n) damping times ω, stiffness that is not Hermitian, and stiffness that acts a quarter of a period ahead; or all (n,) where the
-        modes are coupled by nothing else than `springs`.
+        (n, n) damping times ω, non-Hermitian part of the stiffness, and hysteretic stiffness with a phase lead of a quarter period; all
+        (n,) if only `springs` couple the modes.
     springs
-        (r, n) with the damping ``-springsᴴ springs`` times ω: damping by a stiffness that the springs in place of the contacts are no part of.
+        (r, n) factor of the damping ``-springsᴴ springs`` times ω, for stiffness-proportional damping without the mean springs.
     ports
         (m, n) gaps at the ports of the contacts.
     omega
-        rad/s.
+        Frequency of the motion, rad/s.
     feedback
-        Aerodynamic force of a table of frequencies on the modes, of which the matrices hold the frozen form; None for none.
+        Tabulated aerodynamic force on the modes, whose frozen form is in the matrices; None without one.
     """
 
     stiffness: FloatArray
@@ -53,19 +53,19 @@ class HillModes:
 
     @property
     def ratios(self) -> FloatArray:
-        """(n,) frequencies of the modes over that of the motion; infinite without mass."""
+        """(n,) frequencies of the modes over the frequency of the motion; infinite without mass."""
         with np.errstate(divide="ignore"):
             return np.sqrt(np.abs(self.stiffness) / self.mass)
 
     def diagonal(self, z: complex, sign: float) -> ComplexArray | None:
-        """Return the (n,) dynamic stiffness at ``z = σ + ih`` without the part of `springs`; None where it is not diagonal."""
+        """Return the (n,) dynamic stiffness at ``z = σ + ih`` without the part of `springs`; None if it is not diagonal."""
         if self.damping.ndim == 2 or self.feedback is not None:
             return None
         more = z * self.damping + self.rest + 1j * sign * self.loss
         return np.asarray(self.stiffness + z * z * self.mass + more)
 
     def dynamic(self, z: complex, sign: float) -> ComplexArray:
-        """Return the (n, n) dynamic stiffness at ``z = σ + ih``; `sign` is that of the frequency."""
+        """Return the (n, n) dynamic stiffness at ``z = σ + ih``; `sign` is the sign of the frequency."""
         out = z * self.damping + self.rest + 1j * sign * self.loss
         out = np.diag(out) if out.ndim == 1 else out
         out = out - z * (self.springs.conj().T @ self.springs)
@@ -73,7 +73,7 @@ class HillModes:
         return np.asarray(out if self.feedback is None else out - self._air(self.feedback, z))
 
     def _air(self, force: Feedback, z: complex) -> ComplexArray:
-        """Return the difference of the tabulated aerodynamic force from the frozen one at the frequency of the disturbance."""
+        """Return the tabulated minus the frozen aerodynamic force at the frequency of the disturbance."""
         s = self.omega * z.imag
         stiff, damp = force.influence.frozen(force.phase_angle, force.reference)
         if s >= 0.0:
@@ -101,13 +101,13 @@ def hill_modes(
     gap_operator
         (3 n_contacts, n).
     springs
-        (3 n_contacts,) springs that represent the contacts, N/m.
+        (3 n_contacts,) mean springs of the contacts, N/m.
     ports
-        Rows of the gap operator where contacts differ from them.
+        Rows of the gap operator where contacts differ from their mean springs.
     omega
         Frequency of the motion, rad/s.
     feedback
-        Aerodynamic force, of which the structure holds the frozen form; None for none.
+        Tabulated aerodynamic force, whose frozen form is in the structure; None without one.
     """
     m, c, k, rows = (_dense(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator))
     k = k + rows.T @ (springs[:, None] * rows)
@@ -144,12 +144,12 @@ def hill_modes(
 
 @dataclass(frozen=True, eq=False)
 class HillSide:
-    """The linear structure for disturbances of a motion: harmonic h of a disturbance of wave k' is the wave ``k' + h m``.
+    """Linear structure for disturbances of a motion: harmonic h of a disturbance of wave k' is the wave ``k' + h m``.
 
     Attributes
     ----------
     system
-        One structure, or a tuned wheel that has every wave.
+        One structure, or a tuned wheel with every wave.
     springs, ports
         From `contact_tangents`.
     omega
@@ -199,7 +199,7 @@ class HillSide:
 
 
 def _share_of_springs(damping: Matrix, held: Matrix) -> float:
-    """Return the share of the springs' stiffness that is missing in the coupling damping, by least squares."""
+    """Return the share of the mean springs that is missing in the coupling damping, by least squares."""
     springs = held.conj().T @ held
     off = springs - np.diag(np.diagonal(springs))
     size = float(np.vdot(off, off).real)

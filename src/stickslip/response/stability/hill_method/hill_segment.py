@@ -2,8 +2,8 @@
 
 A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h q_h`` and contact forces
 ``f = D(σ) g``. Modes far from resonance are eliminated with the contacts. The matrix S(σ) of the remaining modes has no poles near the segment, so a
-polynomial through a few σ is accurate to many digits. Harmonics of the contacts above the solved ones act to first order, ``-D R D``
-with the receptance R at the ports.
+polynomial through a few σ is accurate to many digits. Contact harmonics above the solved ones act to first order, ``-D R D`` with the receptance R at
+the ports.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,19 +19,19 @@ from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.hill_method.contact_tangent import ContactTangent
 from stickslip.response.stability.hill_method.hill_modes import HillModes, HillSide
 
-TOGETHER = 2.0  # times what changes of stiffness do to a mode alone: for what modes do together
-LET_GO = 0.1  # of its mean: a mode whose stiffness falls below is carried away by what is left, however it is damped
-NODES = 8  # of the polynomial through a segment of half a frequency
-AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring; or so many times as far:
-FARTHER = (1.0, 2.0, 4.0, 8.0)
-SMOOTH = 1e-4  # of its largest term: the last one of a polynomial that is near the matrix
-MOST_RINGING = 400  # modes of all harmonics together
-HALF = 0.5  # frequency of the motion: length of a segment
+TOGETHER = 2.0  # safety factor on the growth of a single mode, for coupled modes
+LET_GO = 0.1  # stiffness of a mode over its mean below which damping no longer excludes growth
+NODES = 8  # of the polynomial on a segment
+AWAY = 0.75  # distance of a mode from a segment, in frequencies of the motion, above which it does not resonate; ...
+FARTHER = (1.0, 2.0, 4.0, 8.0)  # ... factors on this distance to try
+SMOOTH = 1e-4  # last term of an accurate polynomial, relative to its largest
+MOST_RINGING = 400  # resonating modes of all harmonics together
+HALF = 0.5  # length of a segment, in frequencies of the motion
 Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
 
 def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
-    """Return the highest mode frequency, over that of the motion, at which contacts can destabilise a mode; 0 if there is none."""
+    """Return the highest frequency of a mode that contacts can destabilise, over the frequency of the motion; 0 without such a mode."""
     if not tangents:
         return 0.0
     tops = (_top(side.modes(wave, 0), tangents) for wave in range(side.waves // 2 + 1))
@@ -39,10 +39,10 @@ def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
 
 
 def _top(modes: HillModes, tangents: Sequence[ContactTangent]) -> float:
-    """Return the highest mode frequency of one wave, over that of the motion, at which contacts can destabilise a mode; 0 if there is none.
+    """Return `reach` for one wave.
 
-    At a sudden change of stiffness the amplitude of a fast mode grows at most by the square root of the ratio of its frequencies before
-    and after, at the worst phase; between changes it decays by damping. A mode with a negative sum over the period cannot grow.
+    At a sudden change of stiffness, the amplitude of a fast mode grows at most, at the worst phase, by the square root of the ratio of its
+    frequencies before and after; between changes it decays by damping. A mode with a negative total logarithm over the period cannot grow.
     """
     share = _relative(modes, tangents)
     own = np.log(np.maximum(1.0 + share, LET_GO))
@@ -69,7 +69,7 @@ def _relative(modes: HillModes, tangents: Sequence[ContactTangent]) -> FloatArra
     return np.asarray(total / modes.stiffness)
 
 
-TAIL, MOST_TAIL = (3, 60)  # times the harmonics that are solved: up to which those beyond act, and so many at most
+TAIL, MOST_TAIL = (3, 60)  # highest harmonic that acts to first order: over the highest solved one, and at most
 
 
 def not_kept(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -88,7 +88,7 @@ class Hill:
     tangents
         Tangents of the contacts that change in the period.
     order
-        Highest harmonic of disturbances that is solved.
+        Highest solved harmonic of the disturbances.
     keep
         Cache of the matrices of a segment by their inputs.
     """
@@ -100,7 +100,7 @@ class Hill:
 
     @cached_property
     def reach(self) -> float:
-        """Number of harmonics up to which contacts can destabilise a mode."""
+        """Highest frequency of a mode that contacts can destabilise, in harmonics of the motion."""
         return reach(self.side, self.tangents)
 
     @property
@@ -123,18 +123,18 @@ class Hill:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """The small matrices at one exponent.
+    """Small matrices at one exponent.
 
     Attributes
     ----------
     whole
         (s, s) matrix with the contacts.
     beyond
-        (s, s) part of the harmonics above the solved ones in it.
+        (s, s) contribution of the harmonics above the solved ones to it.
     alone
-        (s, s) matrix with springs in place of the contacts.
+        (s, s) matrix with mean springs in place of the contacts.
     phase
-        Argument of the determinant of the eliminated part, relative to that without contacts.
+        Argument of the determinant of the eliminated part, relative to the part without contacts.
     """
 
     whole: ComplexArray
@@ -145,7 +145,7 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """Exponents ``x + iy`` with y between `low` and ``low + 1/2``, of the disturbances of a wave."""
+    """Interval of exponents ``growth + iy`` with y between `low` and ``low + 1/2``, for the disturbances of a wave."""
 
     hill: Hill
     wave: int
@@ -160,7 +160,7 @@ class Segment:
 
     @cached_property
     def slow(self) -> list[IntArray]:
-        """The modes of each harmonic that can resonate."""
+        """Modes of each harmonic that can resonate."""
         found = []
         for h in self.hill.core:
             ratios = self.hill.side.modes(self.wave, int(h)).ratios
@@ -171,7 +171,7 @@ class Segment:
 
     @cached_property
     def heights(self) -> FloatArray:
-        """(NODES,) imaginary parts of the nodes, ends included."""
+        """(NODES,) imaginary parts of the nodes, including the ends."""
         x = np.cos(np.pi * np.arange(NODES)[::-1] / (NODES - 1))
         return self.low + 0.5 * HALF * (1.0 + x)
 
@@ -190,7 +190,7 @@ class Segment:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """The matrices at the nodes."""
+        """Matrices at the nodes."""
         place = f"wave {self.wave}, {self.low} + {self.growth}, {self.away}, H = {self.hill.order}"
         kept = self.hill.keep(place, self._matrices)
         names = [f.name for f in fields(Node)]
@@ -236,7 +236,7 @@ class Segment:
         felt = self._felt(own, gaps, k, k)
         whole = alone + forces @ felt
         beyond = self._beyond(sigma, core, tail, gaps)
-        # what changed forces do to the gaps, and these to the forces
+        # effect of the changed forces on the gaps, and of these on the forces
         moved = scipy.linalg.lu_solve(
             factors, (receptance @ beyond.reshape(k, m, -1)).reshape(k * m, -1), check_finite=False
         )
@@ -256,7 +256,7 @@ class Segment:
             modes = self.hill.side.modes(self.wave, int(h))
             away = (
                 np.abs(modes.ratios - abs(h + self.low + 0.5 * HALF)) > AWAY + 0.5 * HALF
-            )  # one that rings there is left out
+            )  # resonating modes are left out
             answer[i] = -_receptance(modes, sigma + 1j * h, away) @ forces[i]
         return self._felt(back, answer.reshape(tail.size * m, -1), tail.size, k)
 
@@ -278,7 +278,7 @@ class Segment:
 
 
 def fitted(segment: Segment) -> Segment:
-    """Return a segment with enough modes kept to have no poles near it, if the limits allow."""
+    """Return a segment with enough retained modes for an accurate polynomial, if the limits allow."""
     for factor in FARTHER:
         trial = replace(segment, away=factor * AWAY)
         if sum(own.size for own in trial.slow) > MOST_RINGING:
@@ -293,10 +293,10 @@ def fitted(segment: Segment) -> Segment:
 class _Part:
     """One harmonic with its non-resonant modes eliminated."""
 
-    alone: ComplexArray  # (s, s) of those that do
-    ports: ComplexArray  # (m, s) gaps by them
-    forces: ComplexArray  # (s, m) what contact forces do to them
-    receptance: ComplexArray  # (m, m) of the others
+    alone: ComplexArray  # (s, s) matrix of the resonant modes
+    ports: ComplexArray  # (m, s) gaps due to resonant modes
+    forces: ComplexArray  # (s, m) effect of contact forces on resonant modes
+    receptance: ComplexArray  # (m, m) of the eliminated modes
 
 
 def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
@@ -311,7 +311,7 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
         right = np.hstack([B_r.conj().T, Z[np.ix_(rest, slow)]])
         solved = np.linalg.solve(Z[np.ix_(rest, rest)], right)
     else:
-        # Z = D - z Yᴴ Y, the inverse of which is that of D and a small matrix
+        # Z = D - z Yᴴ Y is inverted by the Woodbury formula
         Y_s, Y_r = held[:, slow], held[:, rest]
         inner = np.diag(D[slow]) - z * (Y_s.conj().T @ Y_s)
         across = -z * (Y_s.conj().T @ Y_r)
@@ -325,7 +325,7 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
 
 
 def _receptance(modes: HillModes, z: complex, away: BoolArray) -> ComplexArray:
-    """Return the (m, m) receptance at the ports of the modes `away` from resonance, without their coupling damping."""
+    """Return the (m, m) receptance at the ports of the modes `away` from resonance, without damping between modes."""
     damping, rest = (np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest))
     own = damping - np.sum(np.abs(modes.springs) ** 2, axis=0)
     Z = modes.stiffness + z * z * modes.mass + z * own + rest

@@ -10,35 +10,35 @@ from stickslip.response.stability.hill_method.hill_segment import HALF, Hill, Se
 from stickslip.response.stability.hill_method.hill_zeros import Matrix, Zeros, turning, zeros_near
 
 WIDE, HIGH = 0.3, 0.32  # half axes of the ellipse about a segment
-# beside a segment: left of which exponents are not sought, and right of which they are solved again
+# real parts relative to a segment: smallest of sought exponents, and smallest of exponents that are solved again
 LEFT, SURE = -0.12, 0.04
-ROUNDS, STEP, LAST_CHANGE, MAX_CHANGE = 8, 1e-6, 1e-8, 0.1  # of Newton's method on the matrix itself
-EDGE = 5e-3  # beyond the ends of a segment that exponents may lie
+ROUNDS, STEP, LAST_CHANGE, MAX_CHANGE = 8, 1e-6, 1e-8, 0.1  # of Newton's method on the exact matrix
+EDGE = 5e-3  # allowed distance of exponents beyond the ends of a segment
 ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
-PATH = 65  # values of a determinant along a segment
-STEPS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)  # real parts of segments where exponents are missing
-FURTHER = 1.25  # times the harmonics for an exponent that is solved again where others are missing,
-TRIES = 3  # of so many that grow,
-UNCOUNTED = 3e-3  # and what modes that ring above may change in it; measured: 1.4e-3
-TWIN = 1e-5  # distance of an exponent that two segments have found
-WHOLE = 0.05  # farther from a whole number the turns of a determinant are no count
+PATH = 65  # points of a determinant along a segment
+STEPS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)  # real parts of further segments if exponents are missing
+FURTHER = 1.25  # factor on the harmonics to confirm an exponent while others are missing
+TRIES = 3  # largest number of growing exponents to confirm
+UNCOUNTED = 3e-3  # error of a confirmed exponent from modes that resonate above; measured: 1.4e-3
+TWIN = 1e-5  # distance up to which exponents of two segments are the same
+WHOLE = 0.05  # largest distance of a winding number from an integer
 
 
 @dataclass(frozen=True, eq=False)
 class Exponents:
-    """Exponents σ = λ/ω of the disturbances of a motion, in order of falling growth.
+    """Exponents σ = λ/ω of the disturbances of a motion, in order of decreasing growth.
 
     Attributes
     ----------
     values
         (e,) with imaginary parts from -1/2 to 1/2.
     errors
-        (e,) change by the harmonics above the solved ones, to first order.
+        (e,) first-order change by the harmonics above the solved ones.
     waves, harmonics
         (e,) wave number and strongest harmonic of each disturbance.
     missing
-        Number of exponents right of the imaginary axis that were not found; None if they could not be counted. Then only the fastest
-        growing one that more harmonics confirm is kept right of the axis.
+        Number of exponents right of the imaginary axis that were not found; None if they could not be counted. Unless it is 0, only the
+        fastest growing exponent that more harmonics confirm is kept right of the axis.
     """
 
     values: ComplexArray
@@ -63,14 +63,14 @@ class Part:
     harmonics: IntArray
 
     def taken(self, which: BoolArray | IntArray) -> "Part":
-        """Return the exponents at some indices."""
+        """Return a selection of the exponents."""
         return Part(self.segment, self.values[which], self.errors[which], self.harmonics[which])
 
 
 def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
     """Return all exponents of a motion near the imaginary axis and right of it, or those near some segments.
 
-    For a wheel each wave is a separate problem. Since disturbances are real, those of wave -k are the conjugates of those of wave k.
+    For a wheel each wave is a separate problem. Disturbances are real, so the exponents of waves k and -k are conjugate.
     """
     if segments:
         return _gathered([_zeros(fitted(segment)) for segment in segments], hill, None)
@@ -118,7 +118,7 @@ def segments_of(hill: Hill) -> list[Segment]:
 
 
 def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
-    """Return the number of exponents right of the imaginary axis, from the winding of the determinant along it; None where unknown."""
+    """Return the number of exponents right of the imaginary axis, from the winding of the determinant along it; None if unknown."""
     if not all(segment.smooth for segment in axis) or not _rings(axis):
         return None
     each = [_turns(segment, zeros) for segment, zeros in zip(axis, found, strict=True)]
@@ -129,7 +129,7 @@ def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
 
 
 def _rings(axis: Sequence[Segment]) -> bool:
-    """Return whether a mode rings in a harmonic that is solved, and contacts can make none grow that rings above them all."""
+    """Whether a mode resonates in a solved harmonic, and contacts can destabilise no mode above all solved harmonics."""
     hill = axis[0].hill
     if not hill.tangents:
         return True
@@ -138,7 +138,7 @@ def _rings(axis: Sequence[Segment]) -> bool:
 
 
 def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
-    """Return the winding of the determinant along a segment, and the number of exponents right of it with springs in place of the contacts."""
+    """Return the winding of the determinant along a segment relative to mean springs, and the number of growing exponents with mean springs."""
     whole, alone = _matrix(segment, "whole"), _matrix(segment, "alone")
     path = ON_AXIS + 1j * np.linspace(segment.low, segment.high, PATH)
     without = _raw(segment, "alone").values
@@ -154,7 +154,7 @@ def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
 def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
     """Return the exponents near a segment, their errors, and their strongest harmonics.
 
-    Far from the segment the polynomial has spurious zeros, so zeros right of the segment are solved again with the matrix itself.
+    Far from the segment the polynomial has spurious zeros, so zeros right of the segment are solved again with the exact matrix.
     """
     found = _raw(segment, "whole") if zeros is None else zeros
     beside = found.values.real - segment.growth
@@ -179,7 +179,10 @@ def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
 def _solved(
     segment: Segment, sigma: complex
 ) -> tuple[complex, ComplexArray, ComplexArray, ComplexArray, complex] | None:
-    """Return an exponent by Newton's method on the matrix itself, with its vectors, the part of higher harmonics and the slope; None without convergence."""
+    """Solve for an exponent by Newton's method on the exact matrix; None without convergence.
+
+    The result is the exponent, its right and left vectors, the contribution of higher harmonics, and the slope.
+    """
     start = sigma
     for _ in range(ROUNDS):
         here, beside = segment.node(sigma), segment.node(sigma + STEP)
@@ -229,7 +232,7 @@ def _growing(parts: list[Part], hill: Hill) -> int:
 
 
 def _gathered(parts: list[Part], hill: Hill, missing: int | None) -> Exponents:
-    """Return all exponents and their conjugates once each, in order of falling growth."""
+    """Return all exponents and their conjugates once each, in order of decreasing growth."""
     waves = hill.side.waves
     segment = np.concatenate([np.full(p.values.size, i) for i, p in enumerate(parts)])
     wave = np.concatenate([np.full(p.values.size, p.segment.wave) for p in parts])
@@ -240,13 +243,13 @@ def _gathered(parts: list[Part], hill: Hill, missing: int | None) -> Exponents:
     for i in np.argsort(-values.real, kind="stable"):
         others = np.array([j for j in kept if segment[j] != segment[i]], dtype=np.int64)
         same = (wave[others] == wave[i]) & (np.abs(values[others] - values[i]) < TWIN)
-        for turn in (-1, 1):  # the same disturbance, its harmonics counted from another one
+        for turn in (-1, 1):  # the same disturbance with shifted harmonics
             twin = np.abs(values[others] - values[i] - 1j * turn) < EDGE
             same |= twin & (wave[others] == hill.side.wave_of(int(wave[i]), -turn))
         if not np.any(same):
             kept.append(int(i))
     own = np.array(kept, dtype=np.int64)
-    # of a wave that is its own conjugate an exponent at an end stands for itself, or its conjugate has been found, too
+    # for a self-conjugate wave, an exponent at an end is its own conjugate, or its conjugate has been found, too
     at_end = np.minimum(np.abs(values[own].imag), np.abs(np.abs(values[own].imag) - HALF)) < EDGE
     paired = own[~(((-wave[own]) % waves == wave[own]) & at_end)]
     both, sign = np.append(own, paired), np.repeat([1, -1], [own.size, paired.size])

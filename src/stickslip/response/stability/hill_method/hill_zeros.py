@@ -11,31 +11,31 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 
 POINTS = 64  # of a contour
-RANK = 1e-10  # singular value of the first moment, over the largest, that is none
+RANK = 1e-10  # relative singular value of the first moment that counts as zero
 ROUNDS = 6  # of Newton's method
-LAST_CHANGE = 1e-9  # change of a zero that ends it
-NUDGE = 1e-9  # beside a zero, where the matrix can be solved
-OUTSIDE = 1.5  # squared size of the ellipse beyond which the integral shows nothing
-MAX_CHANGE = 0.05  # a zero that Newton's method moves farther was none
-LARGEST_TURN = 2.0  # rad between two values of a determinant, beyond which its turns are not counted
+LAST_CHANGE = 1e-9  # change of a zero that ends Newton's method
+NUDGE = 1e-9  # offset from a zero, so that the matrix is regular
+OUTSIDE = 1.5  # squared size relative to the ellipse, above which zeros are discarded
+MAX_CHANGE = 0.05  # largest total change of a zero by Newton's method; others are spurious
+LARGEST_TURN = 2.0  # largest change of the determinant's argument between two points, rad
 
 Matrix = Callable[[ComplexArray], ComplexArray]  # (k,) exponents -> (k, s, s)
 
 
 @dataclass(frozen=True, eq=False)
 class Zeros:
-    """Zeros of the determinant of a matrix function, with their vectors.
+    """Zeros of the determinant of a matrix function S, with their vectors.
 
     Attributes
     ----------
     values
         (z,) exponents.
     right, left
-        (z, s) vectors with ``S v = 0`` and ``wᴴ S = 0``, the rows of S being divided by `scale`.
+        (z, s) vectors with ``S v = 0`` and ``wᴴ S = 0``, where the rows of S are divided by `scale`.
     slopes
         (z,) ``wᴴ S' v``.
     scale
-        (s, 1) of the rows.
+        (s, 1) scale of the rows.
     """
 
     values: ComplexArray
@@ -46,7 +46,7 @@ class Zeros:
 
 
 def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high: float) -> Zeros:
-    """Return the zeros within an ellipse, and zeros beside it that the integral contains.
+    """Return the zeros within an ellipse, and zeros near it that the integral resolves.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high
     if not s:
         nothing = np.zeros(0, dtype=complex)
         return Zeros(nothing, none, none, nothing, np.ones((s, 1)))
-    scale = np.max(np.abs(values), axis=(0, 2))[:, None]  # rows are of very different size
+    scale = np.max(np.abs(values), axis=(0, 2))[:, None]  # rows differ widely in size
     inverse = np.linalg.inv(values / scale)
     first = np.tensordot(step, inverse, axes=1)
     second = np.tensordot(step * around, inverse, axes=1)
@@ -88,7 +88,7 @@ def _polished(matrix: Matrix, slope: Matrix, starts: ComplexArray, vectors: Comp
         moving = np.flatnonzero(np.abs(change) >= LAST_CHANGE)
         if not moving.size:
             break
-        # no zero itself, where nothing could be solved
+        # beside the zero, where the matrix is regular
         near: ComplexArray = np.asarray(now[moving] + NUDGE)
         moved = _times(slope(near), right[moving])
         following = np.linalg.solve(matrix(near), moved[:, :, None])[:, :, 0]
@@ -114,7 +114,7 @@ def _times(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
 
 
 def turning(matrix: Matrix, zeros: ComplexArray, path: ComplexArray) -> float:
-    """Return the change of the argument of the determinant along a path, rad; NaN where the path is too coarse.
+    """Return the change of the determinant's argument along a path, rad; NaN if the path is too coarse.
 
     Known zeros near the path are divided out, and their contribution is added exactly.
     """
