@@ -50,8 +50,8 @@ class Rows:
     always
         Whether a result without any records has the variables, of length zero.
     beside
-        Whether the variables have a further dimension, that of their owners; shorter rows are padded. The padding is
-        known by the missing first field of the record.
+        Whether the variables have the dimension of their owners as well; shorter rows are padded. The padding is known by
+        the missing first field of the record.
     """
 
     dim: str

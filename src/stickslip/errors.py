@@ -50,7 +50,7 @@ class InputError(StickslipError):
 
     @property
     def argument(self) -> str:
-        """Wrong argument of an object where the place is ``Object.argument``; empty for the object as a whole."""
+        """Wrong argument of an object if the place is ``Object.argument``; empty for the object as a whole."""
         return self.place.partition(".")[2]
 
     def __str__(self) -> str:

@@ -52,9 +52,9 @@ OF_THE_MODEL = ("alert_over",)  # keys of tables that are fields of a model
 class Model(Assembly):
     """Parts, contacts and loads, and the questions that can be asked of them.
 
-    Every key of a study's table is an argument of the method of that name (`forced_response` takes those of [harmonics], [solver]
-    and [limits], too), with the same meaning, unit and default. Editors complete the keys, and type checkers compare them. Numbers are
-    the same as those of a study.
+    Every key of a study's table is an argument of the method of that name, with the same meaning, unit and default.
+    `forced_response` also takes the keys of [harmonics], [solver] and [limits]. Editors complete the keys, and type
+    checkers compare them. A study gives the same numbers.
     """
 
     def assembled(self, harmonics: int, *, every_wave: bool = False) -> Assembled:
@@ -241,7 +241,7 @@ def _contact(contact: Contact) -> str:
 
 
 def _sections(name: str) -> dict[str, type[Section]]:
-    """Return the tables of an analysis by name: its own and those that it shares."""
+    """Return the tables of an analysis by name: its own table and shared tables."""
     own = named(name)
     fields = {table: Tables.model_fields[table].annotation for table in own.shared}
     return {name: own.table, **fields}  # type: ignore[dict-item]

@@ -125,7 +125,7 @@ class Screen(logging.Handler):
     Parameters
     ----------
     console
-        Where to write. If it is no terminal, lines replace bars.
+        Console for the output. Without a terminal, lines replace bars.
     bars
         Largest number of bars, one a worker.
     warnings

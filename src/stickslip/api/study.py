@@ -102,10 +102,11 @@ class Study:
         verify, verify_harmonics
             Compare with time integration, and with twice as many harmonics.
         folder
-            Folder of the results; left out: as the study says.
+            Folder of the results; left out: the folder named in the study.
         executor
-            Executor of the jobs: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or any executor like those
-            of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask client. All machines use the same folder.
+            Executor of the jobs: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or an
+            executor with the interface of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask
+            client. All machines use the same folder.
         shard
             ``"2/5"``: the second of five runs that share the jobs. Each run is started by itself.
 
@@ -194,7 +195,7 @@ def answers(  # noqa: PLR0913
     executor: str | Executor = "",
     shard: str | None = None,
 ) -> Outcome:
-    """Run a study and return the result with what the terminal shows of it; arguments as in `Study.run`."""
+    """Run a study and return the result with its lines for the terminal; arguments as in `Study.run`."""
     asked = {IN_TIME: verify, HARMONICS: verify_harmonics}
     checks = [name for name, wanted in asked.items() if wanted]
     names = [only] if isinstance(only, str) else list(only)

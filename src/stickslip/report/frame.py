@@ -216,7 +216,7 @@ def page_html(
     chapters
         Chapters in the order of the page.
     cards
-        Numbers at the top: the answer, then those below its figure.
+        Numbers at the top: first the answer, then the numbers below its figure.
     answer
         Figure of the answer, and words below it; empty for none.
     conclusion

@@ -22,7 +22,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7
 # from navy over purple and red to dark gold, in grey as well
 _STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 156, 0))
 
-# what all figures share
+# layout of all figures
 _LAYOUT = {
     "autosize": True,
     "paper_bgcolor": "white",
@@ -68,7 +68,7 @@ class Plot:
     title
         Heading of the figure.
     caption
-        Sentences on what the figure shows, with numbers from the data.
+        Sentences on the content of the figure, with numbers from the data.
     figure
         The figure.
     case_captions

@@ -60,9 +60,9 @@ class Node:
     Parameters
     ----------
     data
-        Variables of the analysis. Its attributes are those of the whole result, overridden by its own.
+        Variables of the analysis. Attributes of the analysis override attributes of the whole result.
     key
-        Suffix of figure names where each case has figures of its own; empty for the first case.
+        Suffix of figure names if each case has its own figures; empty for the first case.
     """
 
     data: xr.Dataset

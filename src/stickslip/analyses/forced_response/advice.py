@@ -32,7 +32,7 @@ from stickslip.units import HZ, millimetres
 
 NAMED_POINTS = 4  # open contact points that a line names
 APPROACH_M = 2e-4  # elastic approach of two bodies at rest: pressed metal surfaces approach by micrometres
-HEAVY = 0.3  # mass of a rigid body over that of all other parts: dampers weigh a few per cent of a blade
+HEAVY = 0.3  # mass of a rigid body over the mass of all other parts: dampers weigh a few per cent of a blade
 FAR_OFF = 20.0  # frequencies off by this factor point to units
 _ENDS_OF_SENTENCES = re.compile(r"(?<=[^.0-9])\. (?=[A-Z0-9a-z])|; |: ")
 
@@ -215,7 +215,7 @@ def _notes(question: Question) -> Iterator[str]:
 
 
 def sentences(text: str) -> Sequence[str]:
-    """Return the sentences and clauses of a text, one a line, those after the first indented."""
+    """Return the sentences and clauses of a text, one a line, indented from the second on."""
     head, _, rest = text.partition(": ")
     first, *others = _ENDS_OF_SENTENCES.split(rest.removesuffix("."))
     return [f"{head}: {first}", *(f"  {other}" for other in others)]

@@ -140,7 +140,7 @@ class Chooser:
         return said
 
     def sentence(self, response: Response) -> str:
-        """Say at which frequencies of a case the strategy requested more harmonics, and why.
+        """State the frequencies of a case at which the strategy requested more harmonics, and the reason.
 
         An alert is evaluated at the points of the first passage, even if a repeat or a branch with many harmonics has replaced them.
         """

@@ -60,7 +60,7 @@ def reference_of(sweep: Sweep, retained: int, solved: int = 0) -> Harmonics:
     Parameters
     ----------
     sweep
-        How the response is computed.
+        The sweep of the response.
     retained
         Number of retained coordinates.
     solved

@@ -59,7 +59,7 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
     Raises
     ------
     InputError
-        If a response over speed is asked for and no load has an engine order.
+        If a response over speed is requested and no load has an engine order.
     """
     table = settings.forced_response
     sweep = sweep_through(settings, table, _range(table, engine_order), driven)
@@ -148,7 +148,7 @@ class Question:
     model
         The assembled model; the first output defines the peak.
     sweep
-        Sweep: how the response is computed.
+        Range, harmonics and solver of the response.
     limit
         Change by more harmonics above which there is a warning, a fraction.
     facts
@@ -158,7 +158,7 @@ class Question:
     checks
         Additional checks of this run.
     first
-        Whether this is the first case, which also stores what all cases share.
+        Whether this is the first case, which also stores the variables common to all cases.
     examine
         Points whose stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
     bifurcations

@@ -71,7 +71,7 @@ def require_shooting(settings: Any, model: Model, checks: frozenset[str]) -> Non
     Raises
     ------
     InputError
-        Naming the key, its value, and what to give instead.
+        Naming the key, its value, and the remedy.
     """
     if checks:
         option = sorted(checks)[0].replace("_", "-")

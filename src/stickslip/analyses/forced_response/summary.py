@@ -205,7 +205,7 @@ def _millimetres(size: float) -> str:
 
 
 def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
-    """Return the bifurcations and side branches found, and the limits of the search; empty if not asked for."""
+    """Return the bifurcations and side branches found, and the limits of the search; empty if not requested."""
     if not holds(BifurcationSearch, data):
         return ()
     own = read(BifurcationRows, data)

@@ -120,7 +120,7 @@ def _named_disturbance(branch: CycleBranch, cycle: Cycle) -> str:
 
 
 def _what_tells(found: LimitCycles) -> str:
-    """Name the source that tells to which motion a machine goes after it leaves a limit cycle."""
+    """Return a clause on the motion that a machine reaches after it leaves a limit cycle, or on the way to find it."""
     if found.outcome:
         return f"from a mixed start of all unstable waves, in time: {found.outcome}"
     if any(cycle.time_amplitude is not None for _, cycle in found.cycles):

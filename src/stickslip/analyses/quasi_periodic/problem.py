@@ -109,7 +109,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If no load vibrates with the first frequency, the loads have more than two, or a wheel's loads cannot be told apart.
+        If no load vibrates with the first frequency, the loads have more than two frequencies, or the loads of a wheel
+        cannot be distinguished.
     """
     asked: QuasiPeriodicTable = case.settings.quasi_periodic
     first = {n: load for n, load in model.loads.items() if load.harmonic and not load.second}

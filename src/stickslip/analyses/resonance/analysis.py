@@ -24,7 +24,7 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.study.verdict import Verdict, doubt, to_json
 from stickslip.units import HZ, millimetres
 
-SWEEPS = 8  # largest number of sweeps, at values spread over those of peaks followed back
+SWEEPS = 8  # largest number of sweeps, at values spread over the range of peaks followed back
 UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
 HARMONICS = "harmonics"  # note: the highest peak with more harmonics
 

@@ -59,7 +59,7 @@ class Along:
     model
         The assembled model, whose system covers all speeds.
     sweep
-        Sweep: how the response is computed.
+        Range, harmonics and solver of the response.
     error
         Error of the polynomials between speeds, see `OverSpeed`.
     static_force

@@ -43,7 +43,8 @@ class WaveModes(Wave):
     shape
         (m, n, 3, 2) real and imaginary parts of `shapes`.
     shapes
-        (m, n, 3) complex displacements of the skin's points, the largest of length 1; n = 0 if not asked for. A result has `shape`.
+        (m, n, 3) complex displacements of the skin's points, the largest of length 1; n = 0 if not requested. A result
+        has `shape` instead.
     """
 
     frequencies_hz: FloatArray = column("Hz", "natural frequency", "frequency_hz", along="mode")

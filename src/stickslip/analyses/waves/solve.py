@@ -297,7 +297,7 @@ def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
 
 
 def _own_points(model: Model) -> IntArray:
-    """Return the skin points that do not depend on the neighbour, unlike those of the high cyclic face."""
+    """Return the skin points that do not depend on the neighbouring sector; points of the high cyclic face do."""
     following = np.ones((model.places.n, 1))
     following[own_dofs(model)] = 0.0
     return np.flatnonzero(~model.on_skin(following).any(axis=(0, 2)))

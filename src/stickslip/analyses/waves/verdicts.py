@@ -72,7 +72,7 @@ def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[Verdict, ...]:
 
 
 def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple[Verdict, ...]:
-    """Doubt centrifugal displacements too large for linear statics; those restrained by `contacts` are included."""
+    """Doubt centrifugal displacements too large for linear statics; they lack the restraint of `contacts`, if any."""
     if state is None or not state.too_large:
         return ()
     alone = ", without the restraint of contacts," if contacts else ""

@@ -69,7 +69,7 @@ def write_figure(figure: go.Figure, name: str, path: Path, width: str, style: st
     width
         Width, see `inches`.
     style
-        A style of matplotlib, by name or file, whose fonts, sizes and colours of axes go before those of `STYLE`; empty for none.
+        A style of matplotlib, by name or file, whose fonts, sizes and colours of axes override `STYLE`; empty for none.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Checks of a forced response on the page: stability, motions without a period, time integration, retention."""
+"""Checks of a forced response on the page: stability, non-periodic motions, time integration, retention."""
 
 import numpy as np
 import plotly.graph_objects as go

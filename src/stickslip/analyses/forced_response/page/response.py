@@ -375,7 +375,7 @@ class Response(Node):
         return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
 
     def place(self, case: ShownCase) -> str:
-        """Return where the peak of a case is: its speed for a response over speed, else its frequency."""
+        """Return the speed of the peak of a case for a response over speed, else its frequency."""
         speed = float(self.of_points.speed_rpm[self.peak(case)]) if self.of_points.speed_rpm.size else np.nan
         hz = f"{number(self.peak_hz(case), 5)} Hz"
         return f"{number(speed, 5)} rpm ({hz})" if np.isfinite(speed) else hz
@@ -393,7 +393,7 @@ class Response(Node):
 
     @property
     def chosen(self) -> int:
-        """Index of the case whose contacts are shown first: among those with the best verdict the smallest resonance peak; -1 for none."""
+        """Index of the case shown first: the smallest resonance peak among the best verdicts; -1 for none."""
         if not self.peaked:
             return -1
 

@@ -38,7 +38,7 @@ def known(question: Question, response: Response, shift: tuple[float, float]) ->
 
 
 def doubts_of_model(question: Question) -> list[str]:
-    """Return the warnings of the assembled model; of modes missed by the reduction only those that the load excites."""
+    """Return the warnings of the assembled model, without modes above the load's highest frequency."""
     known = question.model.frequencies
     reach = question.driven[-1] * max(question.sweep.omega_range) / HZ
     others = set(known.warnings())

@@ -41,7 +41,7 @@ NOT_FOLLOWED = "what leaves there is not followed: every sector of so large a wh
 
 @dataclass(eq=False)
 class Remembered:
-    """Multipliers in the order of requests. Those found before an interruption are taken from the notes, as are pieces of Hill's method."""
+    """Multipliers in the order of requests; after an interruption they and pieces of Hill's method come from the notes."""
 
     notes: Notes
     hill: bool = False

@@ -22,8 +22,8 @@ from stickslip.solve.newton_method import newton
 from stickslip.units import HZ, LARGEST_PERCENT, metres
 
 PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of a damper never ends
-LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
-STEPS = 1024  # of a period
+LARGE = 1.0  # percent, above which the balance is repeated with more harmonics to find the cause of the difference
+STEPS = 1024  # time steps of a period
 
 Motion = Literal["attained", "left", "not periodic", "not settled"]
 TOLD: dict[str, str] = {
@@ -73,7 +73,7 @@ class Check:
         Outcome of an integration from the balance's state: it *attained* that motion, *left* it for another one or without bound, is *not
         periodic*, or has *not settled*.
     shows_after
-        Periods in which a disturbance changes a thousandfold by the multiplier; 0 if not asked for.
+        Periods in which a disturbance changes a thousandfold by the multiplier; 0 if not requested.
     """
 
     frequency_hz: float

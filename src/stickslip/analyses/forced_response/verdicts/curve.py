@@ -329,12 +329,12 @@ class Curve:
 
     @property
     def audits(self) -> bool:
-        """Whether solutions could be audited; results of early versions do not say."""
+        """Whether solutions could be audited; unknown in results of early versions."""
         return "audit_error_percent" in self.data
 
     @cached_property
     def reference(self) -> FloatArray:
-        """(n,) predicted relative change by the largest judging set; NaN if not asked for."""
+        """(n,) predicted relative change by the largest judging set; NaN if not requested."""
         return self.read(MoreHarmonics).reference_error_percent / 100
 
     @cached_property

@@ -62,7 +62,7 @@ Rule = Callable[[Curve], Iterator[Finding]]
 
 
 def in_time_there(case: Curve, point: int) -> str:
-    """Say how to integrate in time at a point; in a sweep ``--verify`` integrates only at the peak."""
+    """Return the remedy of a time integration at a point; in a sweep ``--verify`` integrates only at the peak."""
     if point == case.peak or case.range_key == "speed_rpm":
         return IN_TIME
     return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
@@ -138,7 +138,7 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
         yield Finding("trusted", why, remedy)
     left = case.read(SideBranches).side_branch_frequency_hz
     for said in each(case.read(BifurcationRows)):
-        if said.bifurcation_kind == "fold":  # the rule of folds tells of these
+        if said.bifurcation_kind == "fold":  # the rule `folds` reports these
             continue
         remedy = LEAVING.get(str(said.bifurcation_kind), "")
         if said.bifurcation_frequency_hz in left:

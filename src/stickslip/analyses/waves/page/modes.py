@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes on the page, including those of a mistuned wheel."""
+"""Natural frequencies and mode shapes on the page, for tuned and mistuned wheels."""
 
 import numpy as np
 import plotly.graph_objects as go

@@ -15,7 +15,7 @@ from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.tiles import outlines, patches
 
-_ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it is a line
+_ROUNDING = 1e-9  # area of a loop over the area of its bounding box, below which it is a line
 SHOWN_LOOPS = 6  # panels shown, of the points that dissipate most; the others are folded away
 _MOST_LOOPS = 24  # panels shown or folded away
 _FAR = 3.0  # mean of a loop over its half range, above which the mean is removed so that ticks differ
