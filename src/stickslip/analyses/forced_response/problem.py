@@ -243,7 +243,7 @@ class Question:
 
 
 def too_large(question: Question) -> str:
-    """Return why a model has too many coordinates for time integration; empty if it has not."""
+    """Return the reason why a model has too many coordinates for time integration; empty if it has not."""
     system = question.model.system
     if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"

@@ -232,7 +232,7 @@ def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> 
 
 
 def _loads_move(question: Question, response: Response) -> str:
-    """Return why normal forces at the peak vary too much for an estimate; empty if they do not."""
+    """Return the reason why normal forces at the peak vary too much for an estimate; empty if they do not."""
     if response.top is None:
         return "there is no peak"
     laws = question.model.system.springs.laws

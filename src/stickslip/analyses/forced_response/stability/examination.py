@@ -31,7 +31,7 @@ def examination_work(system: System) -> float:
 
 
 def too_long(system: System, *, forced: bool) -> str:
-    """Return why an examination would take too long, by the size of the model; empty if it would not.
+    """Return the reason why an examination would take too long, by the size of the model; empty if it would not.
 
     The cost does not depend on the waves that the harmonics excite, because all sectors are integrated.
 

@@ -276,7 +276,7 @@ def _settledness(spread: float, settled: bool) -> str:
 
 
 def _of_the_step(march: _March, own: int) -> str:
-    """Return why an integration is not reliable with its time step; empty if it is."""
+    """Return the reason why an integration is not reliable with its time step; empty if it is."""
     if march.finer is None:
         return ""
     if march.finer.coarse:

@@ -85,7 +85,7 @@ class Examined:
         return self.verdict in ("unstable", "undecided")
 
     def linear(self, size: float) -> str:
-        """Return why another point with the same contact states is stable; `size`: modulus of its largest multiplier."""
+        """Return the reason why another point with the same contact states is stable; `size`: modulus of its largest multiplier."""
         return (
             f"no contact changes its state, as at {self.omega / HZ:.3f} Hz, so that the exponents are the same: the largest multiplier has the "
             f"modulus {modulus_text(size)}"
@@ -275,7 +275,7 @@ def integrable(question: Question) -> bool:
 
 
 def why_not(question: Question) -> str:
-    """Return why no point of a case can be examined; empty if multipliers or Hill's method are available."""
+    """Return the reason why no point of a case can be examined; empty if multipliers or Hill's method are available."""
     system = question.model.system
     if not by_hill(system):
         return unexaminable(question)
@@ -284,7 +284,7 @@ def why_not(question: Question) -> str:
 
 
 def unexaminable(question: Question) -> str:
-    """Return why no point of a case has all its multipliers; empty if no reason is known."""
+    """Return the reason why no point of a case has all its multipliers; empty if no reason is known."""
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
