@@ -1,7 +1,7 @@
-"""Compile functions that are called by address: their callers compile without them, in a quarter of the time.
+"""Compiled functions that are called by address: their callers compile in a quarter of the time.
 
-Numba fetches the address of a function that is an argument by Python code at every call, a millisecond each, in which a signal's exception
-would be lost. Here it is fetched once and handed over as a number.
+For a function as an argument, numba fetches the address by Python code at every call. This takes a millisecond, and an
+exception raised by a signal would be lost. Here the address is fetched once and passed as a number.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def address_of(function: Any, signature: Any) -> int:
 
 
 def function_at(signature: Any) -> Any:
-    """Return the compiled function that turns an address into a function of this signature."""
+    """Return the compiled function that converts an address into a function of this signature."""
     kind = types.FunctionType(signature)
 
     @intrinsic

@@ -1,6 +1,7 @@
-"""numba with the package's own cache: compiled functions are stored with a checksum, and long compilations are announced.
+"""Compilation by numba with the package's own cache.
 
-Modules that check a study file do not import this one: numba takes a quarter of a second to load.
+Compiled functions have a checksum, and long compilations are announced. Modules that check a study file do not import
+this one: numba takes a quarter of a second to load.
 """
 
 import logging
@@ -16,12 +17,12 @@ from numba.core.dispatcher import Dispatcher
 from stickslip.contact.cache_files import CheckedCache, tell_uncached
 
 LOG = logging.getLogger("stickslip")
-QUIET_SECONDS = 3.0  # seconds after which compiling is worth a line
+QUIET_SECONDS = 3.0  # seconds after which a compilation is announced
 LINE = "compiling contact laws or time steps; needed once after installing, a minute or two"
 
 
 class _Compiling(event.Listener):
-    """Listener of numba's compilations; compilation of called functions is nested in that of the caller."""
+    """Listener to numba's compilations; compiling a called function is nested in compiling its caller."""
 
     def __init__(self) -> None:
         self.depth = 0
@@ -29,7 +30,7 @@ class _Compiling(event.Listener):
         self.told = False
 
     def tell(self) -> None:
-        """Log the line, once a process."""
+        """Log the line, once per process."""
         if not self.told:
             self.told = True
             LOG.info(LINE)
@@ -53,15 +54,15 @@ _LISTENER = _Compiling()
 
 
 def say_what_is_compiled() -> None:
-    """Log a line whenever a function takes seconds to compile."""
+    """Log a line when a function takes seconds to compile."""
     event.register("numba:compile", _LISTENER)  # type: ignore[no-untyped-call]
 
 
 def njit(*asked: Any, cache: bool = False, **options: Any) -> Any:
-    """Compile as `numba.njit` does; with ``cache`` in a cache of this package.
+    """Compile like `numba.njit`; with ``cache``, store the code in the cache of this package.
 
-    If numba has no folder that it may write, functions with a cache are compiled at every start; numba itself would refuse to load
-    them. A function is compiled again if its file, or one that this file imports, has changed.
+    If numba finds no writable folder, functions with a cache are compiled at every start; numba itself would refuse to
+    load them. A function is compiled again if its file, or a file that this one imports, has changed.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Files of the compilation cache: each has a checksum and the dates of all its sources.
+"""Files of the compilation cache, with a checksum and the dates of all sources.
 
-numba offers its caches as classes; the dispatcher of a function holds one as an attribute. Nothing of numba is replaced here, and
-functions of other programs keep numba's own cache.
+numba offers its caches as classes, and the dispatcher of a function has one as an attribute. Thus nothing in numba is
+replaced, and functions of other programs keep numba's own cache.
 """
 
 import hashlib
@@ -19,17 +19,19 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 LOG = logging.getLogger("stickslip")
 MARK = b"stickslip: compiled, SHA-256, pickle\n"  # at the beginning of each file
-NUMBAS_OWN = b"\x80"  # what files of numba begin with; earlier versions of this package kept such
+NUMBAS_OWN = b"\x80"  # first byte of numba's own files, which earlier versions of this package used
 _PACKAGE = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^\s*from stickslip\.([\w.]+) import", re.MULTILINE)
-_TOLD = "STICKSLIP_UNCACHED"  # in the environment: worker processes need not say it again
+_TOLD = "STICKSLIP_UNCACHED"  # environment variable with which worker processes know that the warning was logged
 
 
 class CheckedFiles(IndexDataCacheFile):
-    """Index and data of one function. A file that fails its checksum is deleted with one line in the log; an outdated file is ignored.
+    """Index and data of one function.
 
-    A file consists of `MARK`, the SHA-256 of the rest, and two pickles: the state of its sources, and its content. The key of the index
-    precedes the data, so that a file of the same name from another or a killed process is not mistaken for this function's.
+    A file that fails its checksum is deleted with one line in the log; an outdated file is ignored. A file consists of
+    `MARK`, the SHA-256 of the rest, and two pickles: the state of its sources, and its content. The index key is stored
+    with the data, so that a file with the same name from another or a killed process is not mistaken for this
+    function's file.
     """
 
     def load(self, key: Any) -> Any:
@@ -69,7 +71,7 @@ class CheckedFiles(IndexDataCacheFile):
             stream.write(MARK + hashlib.sha256(both).digest() + both)
 
     def _read(self, path: str) -> Any:
-        """Return the content of a file; None where there is none that serves."""
+        """Return the content of a file; None if there is no usable one."""
         file = Path(path)
         if not file.exists():
             return None
@@ -86,7 +88,9 @@ class CheckedFiles(IndexDataCacheFile):
 
 
 class CheckedCache(FunctionCache):
-    """numba's cache of one function, with `CheckedFiles`. A file that cannot be read or written costs a compilation, and never ends the program.
+    """numba's cache of one function, with `CheckedFiles`.
+
+    A file that cannot be read or written costs a compilation, but never stops the program.
 
     Parameters
     ----------
@@ -96,7 +100,7 @@ class CheckedCache(FunctionCache):
     Raises
     ------
     RuntimeError
-        If numba finds no folder that it may write.
+        If numba finds no writable folder.
     """
 
     def __init__(self, py_func: Any) -> None:
@@ -130,9 +134,9 @@ class CheckedCache(FunctionCache):
 
 @cache
 def _contents(file: Path) -> str:
-    """Return the digest of all files of this package that a file imports, directly or through others.
+    """Return the digest of all files of this package that a file imports, directly or indirectly.
 
-    numba looks at the function's own file only, and would go on with the constants and functions of before.
+    numba checks only the function's own file, and would otherwise use old constants and functions.
     """
     found: set[Path] = set()
     to_do = [file] if file.is_file() else []

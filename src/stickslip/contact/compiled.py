@@ -1,4 +1,4 @@
-"""Contact laws as arrays, the input of the evaluators, and the names of these."""
+"""Contact laws as arrays, the input of the evaluators, and the names of the evaluators."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,8 +36,8 @@ class CompiledContacts:
     Attributes
     ----------
     evaluator
-        Evaluator of piecewise-linear laws: ``intervals`` (on samples), ``events`` (exact), or ``march``, which also evaluates
-        all other laws but planar friction.
+        Evaluator of piecewise-linear laws: ``intervals`` (on samples), ``events`` (exact), or ``march``. All other laws
+        except planar friction are marched.
     n_contacts
         Number of contacts.
     pairs
@@ -53,8 +53,8 @@ class CompiledContacts:
     marched
         All other contacts.
     sliders
-        (n_contacts, 3) gaps, m, at which the springs of contacts that are not marched are unstretched before t = 0, zero along
-        the normal; None: zeros.
+        (n_contacts, 3) gaps, m, at which the springs of contacts that are not marched are unstretched before t = 0,
+        zero along the normal; None: zeros.
     """
 
     evaluator: Evaluator
@@ -80,7 +80,10 @@ class CompiledContacts:
         return self.evaluator == "events" and not self.marched and not self.planar.size
 
     def from_sliders(self, gap_coefficients: FloatArray) -> FloatArray:
-        """Return the (2H+1, 3 n_contacts) coefficients of the gaps relative to the initial slider positions, as evaluators start at zero."""
+        """Return the (2H+1, 3 n_contacts) coefficients of the gaps relative to the initial slider positions.
+
+        Evaluators start with sliders at zero.
+        """
         if self.sliders is None:
             return gap_coefficients
         moved = gap_coefficients.copy()
@@ -108,7 +111,7 @@ def compile_contacts(
     Parameters
     ----------
     laws
-        One law a contact.
+        One law per contact.
     weights
         (n_contacts,) factors of the forces; None: ones.
     evaluator
@@ -118,7 +121,7 @@ def compile_contacts(
     Raises
     ------
     InputError
-        If there is no such evaluator, or the weights are not one positive number a contact.
+        If the evaluator is unknown, or the weights are not one positive number per contact.
     """
     check_evaluator(evaluator)
     if weights is not None:
@@ -153,7 +156,7 @@ def compile_contacts(
 
 
 def _sliders(laws: Sequence[ContactLaw], evaluated: Sequence[int]) -> FloatArray | None:
-    """Return where springs start unstretched, of the contacts that are not marched: those start with their state."""
+    """Return the initial slider positions of contacts that are not marched; marched contacts start from their state."""
     given = {c: at for c in evaluated if (at := getattr(laws[c], "slider", None)) is not None}
     if not given:
         return None

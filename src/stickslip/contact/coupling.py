@@ -1,7 +1,8 @@
-"""Coupling of harmonics by contacts: the coupling rows of the derivatives, and their contribution to the Jacobian.
+"""Coupling of harmonics by contacts: the coupled rows of the derivatives, and their contribution to the Jacobian.
 
-A contact that sticks or is open all period answers each harmonic of a gap by the same harmonic of a force, with a complex number. One that slips
-couples the harmonics of its tangential forces with those of all gaps; its normal force couples nothing as long as it stays closed.
+A contact that sticks or is open throughout the period responds to each harmonic of a gap with the same harmonic of a
+force, by a complex factor. A slipping contact couples the harmonics of its tangential forces with those of all gaps;
+its normal force couples nothing while it stays closed.
 """
 
 import numpy as np
@@ -14,7 +15,10 @@ _PAIRS = np.array(PAIRS)  # force and gap direction of each block
 
 @njit(cache=True, nogil=True)
 def _strays(block, p):  # type: ignore[no-untyped-def]
-    """Return the deviation of row `p` of a block, the cosine row of a harmonic, and of the following sine row from the form of a complex number."""
+    """Return the deviation of the rows of a harmonic in a block from the form of a complex number.
+
+    Row `p` is the cosine row of the harmonic, and the sine row follows.
+    """
     h, rest = (p + 1) // 2, 0.0
     for row in range(p, p + (1 if p == 0 else 2)):
         for q in range(block.shape[1]):
@@ -28,7 +32,7 @@ def _strays(block, p):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _split(block, coupled, mean, left):  # type: ignore[no-untyped-def]
-    """Put the rows of a block that are `coupled` (H+1,) into `left` (m, m), and the complex numbers of the others into `mean` (H+1,)."""
+    """Copy the `coupled` (H+1,) rows of a block to `left` (m, m), the complex numbers of others to `mean` (H+1,)."""
     left[:] = 0.0
     for h in range(coupled.size):
         p = max(2 * h - 1, 0)
@@ -52,7 +56,8 @@ def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untype
     rounding
         Share of a contact's largest derivative that counts as zero.
     means
-        Out: (H+1, n_contacts, 3, 3) complex derivatives of a harmonic of a force by the same harmonic of a gap, N/m; zero where the force is coupled.
+        Out: (H+1, n_contacts, 3, 3) complex derivatives of a harmonic of a force by the same harmonic of a gap, N/m;
+        zero if the force is coupled.
     left
         Out: (n_contacts, P, m, m) derivatives of coupled forces, N/m, else zero.
     coupled
@@ -66,7 +71,7 @@ def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untype
         for b in range(n_pairs):
             row = _PAIRS[b, 0]
             for h in range(means.shape[0]):
-                # what is no number couples: nothing is eliminated that should not be
+                # NaN counts as coupled, so that nothing is eliminated wrongly
                 if not _strays(blocks[c, b], max(2 * h - 1, 0)) <= least:
                     coupled[c, row, h] = True
         for b in range(n_pairs):
@@ -76,7 +81,10 @@ def couplings(blocks, rounding, means, left, coupled):  # type: ignore[no-untype
 
 @njit(cache=True, nogil=True)
 def touched(coupled, columns, values, out):  # type: ignore[no-untyped-def]
-    """Set `out` (H+1, n) to whether the equation of a coordinate in a harmonic contains a `coupled` force; `columns` and `values` from `sparse_rows`."""
+    """Fill `out` (H+1, n): whether the equation of a coordinate in a harmonic contains a `coupled` force.
+
+    `columns` and `values` come from `sparse_rows`.
+    """
     out[:] = False
     for c in range(columns.shape[0]):
         for d in range(3):
@@ -89,7 +97,10 @@ def touched(coupled, columns, values, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _followed(columns, values, real, imaginary, kept, gap):  # type: ignore[no-untyped-def]
-    """Set `gap` (2, 3, H+1, most), real and imaginary parts, to what unit amplitudes of the kept coordinates make it at one contact."""
+    """Set `gap` (2, 3, H+1, most) to the gaps of one contact due to unit amplitudes of the kept coordinates.
+
+    The first index is for real and imaginary parts.
+    """
     gap[:] = 0.0
     for d in range(3):
         for j in range(columns.size):
@@ -103,7 +114,10 @@ def _followed(columns, values, real, imaginary, kept, gap):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def _add_row(derivative, gap, kept, first, line):  # type: ignore[no-untyped-def]
-    """Add to `line` (N,) the derivatives of a force by the kept unknowns, from those by the gaps (m,) and the `gap` (2, H+1, most) of each unknown."""
+    """Add to `line` (N,) the derivatives of a force by the kept unknowns.
+
+    They follow from the derivatives by the gaps (m,) and the `gap` (2, H+1, most) due to each unknown.
+    """
     for a in range(kept[0]):
         line[a] += derivative[0] * gap[0, 0, a]
     for h in range(1, kept.size):
@@ -117,7 +131,7 @@ def _add_row(derivative, gap, kept, first, line):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _add_force(columns, values, line, place, out):  # type: ignore[no-untyped-def]
-    """Add a force, a row of its derivatives by the kept unknowns, to the equations of its coordinates."""
+    """Add a force, as a row of derivatives by the kept unknowns, to the equations of its coordinates."""
     for j in range(columns.size):
         if values[j] != 0.0:
             equation = out[place[columns[j]]]

@@ -1,9 +1,10 @@
 """The elementary contact: a normal spring with two independent Jenkins springs (Gastaldi & Berruti 2017, section 5.1).
 
-Its row of parameters is ``k_t, k_w, k_n, mu, preload, residual_traction, unilateral``. With ``unilateral = 1`` the normal force is
-``N = max(0, preload - k_n g_n)`` and limits each tangential spring to ``mu N``; with ``unilateral = 0`` the limit is the constant
-``mu preload`` and the normal spring ``k_n g_n`` acts both ways. ``residual_traction = m`` puts the tangential force just before t = 0 at
-``m mu N``; NaN leaves the spring unstretched at zero displacement.
+Its row of parameters is ``k_t, k_w, k_n, mu, preload, residual_traction, unilateral``. With ``unilateral = 1`` the
+normal force is ``N = max(0, preload - k_n g_n)`` and limits each tangential spring to ``mu N``. With ``unilateral = 0``
+the limit is the constant ``mu preload``, and the normal spring ``k_n g_n`` acts in both directions.
+``residual_traction = m`` sets the tangential force just before t = 0 to ``m mu N``; with NaN the spring is unstretched
+at zero displacement.
 """
 
 import numpy as np

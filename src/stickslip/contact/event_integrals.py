@@ -1,7 +1,7 @@
 """Forces and derivatives of piecewise-linear contacts between known events, in closed form.
 
-What is left of a contact once its events are known are integrals of products of cosines and sines. They may be taken with more
-harmonics than the gaps have, which gives the forces on these harmonics and all derivatives by them without another search.
+Once the events of a contact are known, only integrals of products of cosines and sines remain. They may include more
+harmonics than the gaps have, which gives forces and derivatives in these harmonics without a further search.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from stickslip.contact.law import NN, SLIP, STICK, TN, TT
 from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, PLACE, SIGN, START, STATE, scratch
 from stickslip.contact.trigonometric import add_means, harmonics_at, product_matrix
 
-UNKEPT = -1  # count of events that found no room: round-off made more than such gaps have
+UNKEPT = -1  # number of events if they exceed the arrays: round-off produced more than such gaps can have
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +27,11 @@ class Events:
     polynomials
         (n_contacts, 3, m) real Fourier coefficients of the gaps, m.
     crossings, n_crossings, starts_open
-        (n_elements, 2 order + 4) times at which elements open and close, number of these times, and whether an element begins open.
+        (n_elements, 2 order + 4) times at which elements open and close, number of these times, and whether an element
+        begins open.
     segments, n_segments
-        (n_elements, 2, 12 order + 12, 6) and (n_elements, 2): states of both tangential springs, as `slider.find_segments` finds them.
+        (n_elements, 2, 12 order + 12, 6) and (n_elements, 2): states of both tangential springs, from
+        `slider.find_segments`.
     """
 
     polynomials: FloatArray
@@ -41,12 +43,12 @@ class Events:
 
     @property
     def whole(self) -> bool:
-        """Whether all events fitted into the arrays."""
+        """Whether all events fit into the arrays."""
         return bool(np.all(self.n_crossings > UNKEPT) and np.all(self.n_segments > UNKEPT))
 
     @property
     def none(self) -> bool:
-        """Whether no state changes: then forces are linear in the gaps, and have the same harmonics."""
+        """Whether no state changes, so that forces are linear in the gaps, in the same harmonics."""
         return bool(self.whole and np.all(self.n_crossings == 0) and np.max(self.n_segments, initial=0) <= 1)
 
 
@@ -76,7 +78,7 @@ def _basis_row(at, weight, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _add_stuck(segment, at_start, k, work, coefficients, block_x, block_n):  # type: ignore[no-untyped-def]
-    """Subtract the part of the resting slider in one segment from the force ``k x``."""
+    """Subtract the contribution of the resting slider in one segment from the force ``k x``."""
     _basis_row(work.means[0], 2.0, work.row)
     m = work.row.size
     for p in range(m):
@@ -101,7 +103,7 @@ def _add_stuck(segment, at_start, k, work, coefficients, block_x, block_n):  # t
 
 @njit(cache=True)
 def _apply(means, factor, polynomial, slope, work, coefficients, block):  # type: ignore[no-untyped-def]
-    """Add the integral of ``factor * polynomial`` over intervals to the force and that of ``slope * b b^T`` to the block."""
+    """Add the integral of ``factor * polynomial`` to the force, and of ``slope * b b^T`` to the block."""
     product_matrix(means, work.matrix)
     m = polynomial.size
     for p in range(m):
@@ -126,7 +128,7 @@ def integrate_spring(x, k, limit_slope, count, work, coefficients, block_x, bloc
         at_start, at_end = work.harmonics[i % 2], work.harmonics[(i + 1) % 2]
         left = segments[i, START]
         right = PERIOD if i + 1 == count else segments[i + 1, START]
-        # the end of the period is its beginning to the last bit
+        # the end of the period equals its beginning exactly
         harmonics_at(0.0 if i + 1 == count else right, at_end)
         if segments[i, STATE] == STICK:
             own[:] = 0.0
@@ -182,7 +184,7 @@ def fill_limit(g, row, work):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def keep_rows(values, count, kept):  # type: ignore[no-untyped-def]
-    """Copy the first `count` rows of `values` to `kept`; return their number, or `UNKEPT` where there is no room."""
+    """Copy the first `count` rows of `values` to `kept`; return their number, or `UNKEPT` if `kept` is too small."""
     if count > kept.shape[0]:
         return UNKEPT
     for i in range(count):
@@ -194,7 +196,10 @@ def keep_rows(values, count, kept):  # type: ignore[no-untyped-def]
 def _integrate_events(  # type: ignore[no-untyped-def]
     polynomials, elements, first, crossings, n_crossings, starts_open, segments, n_segments, coefficients, blocks
 ):
-    """Fill coefficients and derivatives of all contacts from their events; the gaps may have more coefficients than there were."""
+    """Fill coefficients and derivatives of all contacts from their events.
+
+    The polynomials may have more coefficients than the events had.
+    """
     work = scratch(polynomials.shape[2], 0, 0)
     for c in range(polynomials.shape[0]):
         coefficients[c] = 0.0
@@ -232,15 +237,15 @@ def integrated(
     elements, first
         As for `exact_period`.
     order
-        Highest harmonic, at least that of the gaps.
+        Highest harmonic, at least the highest one of the gaps.
     pairs
         Number of derivative blocks of a contact, at least five.
 
     Returns
     -------
     tuple
-        (2 order + 1, 3 n_contacts) coefficients of the forces, N; (n_contacts, pairs, 2 order + 1, 2 order + 1) derivatives, N/m, also by
-        harmonics that the gaps do not have.
+        (2 order + 1, 3 n_contacts) coefficients of the forces, N; (n_contacts, pairs, 2 order + 1, 2 order + 1)
+        derivatives, N/m, also by harmonics that the gaps do not have.
     """
     n, _, few = events.polynomials.shape
     m = 2 * order + 1

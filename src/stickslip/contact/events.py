@@ -1,12 +1,13 @@
 """Forces and derivatives of piecewise-linear contacts over one period, by exact events (Petrov & Ewins 2003).
 
-The gaps are trigonometric polynomials, and so are the pressure of a closed contact and, within a state, the friction force. The times
-of opening and closing are found as sign changes of the pressure, those of stick and slip as in `contact.slider`; what is left are
-integrals of products of cosines and sines between them, in closed form: there is no sampling error.
+The gaps are trigonometric polynomials, and so are the pressure of a closed contact and, within a state, the friction
+force. Opening and closing are sign changes of the pressure; transitions between stick and slip are located in
+`contact.slider`. Between these events only integrals of products of cosines and sines remain, in closed form: there is
+no sampling error.
 
-The force is continuous in time, so the motion of the events adds to its derivative only through the place where the slider rests. The
-end of slip is stationary in time and adds nothing; a contact that closes into stick keeps the gap at the time of closing, which moves
-with the normal gap.
+The force is continuous in time, so the motion of the events contributes to its derivative only through the position of
+the resting slider. The end of slip is stationary in time and contributes nothing. A contact that closes into stick
+keeps the gap at the time of closing, which moves with the normal gap.
 """
 
 from functools import lru_cache
@@ -32,12 +33,15 @@ from stickslip.contact.steps.element import normal_contact
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import search_grid
 
-LARGEST = 1e152  # of a gap's Fourier coefficients; its square is still finite
+LARGEST = 1e152  # largest Fourier coefficient of a gap whose square is still finite
 
 
 @njit(cache=True)
 def sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def]
-    """Add the normal force on samples; fill the friction limit there and the state of directions without stiffness."""
+    """Add the normal force on samples.
+
+    Fill the friction limit on samples and the state of directions without stiffness.
+    """
     for i in range(gap.size):
         normal, _, limit[i], _, is_open = normal_contact(gap[i], row)
         force[i] += normal
@@ -66,7 +70,10 @@ def _sample_tangent(gap, k, limit, count, segments, force, state):  # type: igno
 def _element(  # type: ignore[no-untyped-def]
     polynomials, row, e, gap, grid, n_x, work, coefficients, blocks, force, state, kept
 ):
-    """Add coefficients, derivatives and samples of elementary contact `e`; its states are written to `state`, its events kept."""
+    """Add coefficients, derivatives and samples of elementary contact `e`.
+
+    Write its states to `state`, and its events to `kept`.
+    """
     crossings, n_crossings, begins_open, segments, n_segments = kept
     limit_slope = fill_limit(polynomials[2], row, work)
     n_roots, starts_open = 0, False
@@ -157,12 +164,13 @@ def contact_events(  # type: ignore[no-untyped-def]
     coefficients
         Out: (n_contacts, 3, m) Fourier coefficients of the forces (T_t, T_w, -N) in N.
     blocks
-        Out: (n_contacts, P, m, m) their derivatives by the coefficients of the gaps, of which the first five differ from zero: t by t,
-        w by w, n by n, t by n, w by n.
+        Out: (n_contacts, P, m, m) their derivatives by the coefficients of the gaps. Only the first five differ from
+        zero: t by t, w by w, n by n, t by n, w by n.
     force
         Out: (n_contacts, 3, samples) forces on samples.
     state
-        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where they differ.
+        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where
+        they differ.
     kept
         Out: the arrays of `Events` after the polynomials, or empty ones.
     """
@@ -173,7 +181,7 @@ def contact_events(  # type: ignore[no-untyped-def]
 def contact_events_threads(  # type: ignore[no-untyped-def]
     shares, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
 ):
-    """Evaluate as `contact_events`, in `shares` that are distributed over threads."""
+    """Evaluate like `contact_events`, in `shares` that are distributed over threads."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(
@@ -224,7 +232,8 @@ def exact_period(
     -------
     tuple
         (2H+1, 3 n_contacts) coefficients of the forces, N; (n_contacts, pairs, 2H+1, 2H+1) derivatives, N/m;
-        (n_contacts, 3, samples) forces, N; (n_contacts, 2, samples) states. All NaN, and open, where a gap is not finite or beyond 1e152 m.
+        (n_contacts, 3, samples) forces, N; (n_contacts, 2, samples) states. If a gap is not finite or beyond 1e152 m,
+        all numbers are NaN and all states open.
     """
     m, width = gap_coefficients.shape
     n = width // 3
@@ -234,7 +243,7 @@ def exact_period(
     force = np.empty_like(gap)
     state = np.empty((n, 2, gap.shape[2]), dtype=np.int64)
     if not np.all(np.abs(polynomials) < LARGEST):
-        # a lost iterate: what is not a number, or overflows in a product, has no sign changes to look for
+        # a lost iterate: NaN and values that overflow in a product have no sign changes to find
         for each in (coefficients, blocks, force):
             each[:] = np.nan
         state[:] = OPEN

@@ -3,16 +3,16 @@
 Node order: corners anticlockwise seen from outside the body, then the mid node of each edge in turn. Reference
 coordinates: triangles ``xi, eta >= 0, xi + eta <= 1``, quadrilaterals ``-1 <= xi, eta <= 1``.
 
-One array of facets holds several kinds: short rows are filled up with -1. All functions take one facet number a row.
+One array of facets may contain several kinds: short rows are padded with -1. All functions take one facet per row.
 """
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 
-KINDS = (3, 4, 6, 8)  # nodes of a facet that are understood
+KINDS = (3, 4, 6, 8)  # supported numbers of nodes of a facet
 CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
-DEGREE = {3: 1, 4: 2, 6: 2, 8: 3}  # of the shape functions, as polynomials in the plane
+DEGREE = {3: 1, 4: 2, 6: 2, 8: 3}  # polynomial degree of the shape functions in the plane
 REFERENCE_NODES = {
     3: np.array([[0, 0], [1, 0], [0, 1]], dtype=float),
     4: np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float),
@@ -117,7 +117,7 @@ def normals(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
 def node_normals(points: FloatArray, facets: IntArray) -> FloatArray:
     """Return the (n, k, 3) normals of each facet at its own nodes; their length is the facet's angle there in rad.
 
-    Their sum over the facets around a node does not depend on how a surface is cut into triangles (Thürmer & Wüthrich 1998).
+    Their sum over the facets around a node does not depend on the triangulation of a surface (Thürmer & Wüthrich 1998).
     """
     found = np.zeros((*facets.shape, 3))
     for kind, rows in _by_kind(facets):
@@ -135,10 +135,11 @@ def node_normals(points: FloatArray, facets: IntArray) -> FloatArray:
 
 
 def lumped_areas(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the area of each facet distributed to its nodes, (n, k), all positive.
+    """Return the (n, k) area of each facet distributed to its nodes, all positive.
 
-    Linear triangles and parallelograms: ``∫ N_i dA``, thus the loads of a uniform pressure. Quadratic facets: in proportion to ``∫ N_i² dA``
-    (Hinton, Rock & Zienkiewicz 1976), because ``∫ N_i dA`` is zero or negative at their corners.
+    Linear triangles and parallelograms: ``∫ N_i dA``, the nodal loads of a uniform pressure. Quadratic facets: in
+    proportion to ``∫ N_i² dA`` (Hinton, Rock & Zienkiewicz 1976), because ``∫ N_i dA`` is zero or negative at their
+    corners.
     """
     shares = np.zeros(facets.shape)
     for kind, rows in _by_kind(facets):
@@ -162,7 +163,7 @@ def _by_kind(facets: IntArray) -> list[tuple[int, IntArray]]:
 
 
 def _reference_rule(corners: int) -> tuple[FloatArray, FloatArray]:
-    """Return 3 by 3 Gauss points and weights of the reference square, or that square collapsed into the triangle."""
+    """Return 3 by 3 Gauss points and weights of the reference square, or of this square collapsed into the triangle."""
     x, w = np.polynomial.legendre.leggauss(3)
     at = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
     weights = np.outer(w, w).ravel()

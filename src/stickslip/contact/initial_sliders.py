@@ -1,7 +1,8 @@
-"""Slider positions before t = 0: springs whose start is free, an interface that prescribes it, and laws that start from a static state.
+"""Slider positions before t = 0: free, prescribed, or from a static state.
 
-A spring with a slider that never moves keeps its initial state for ever. The start is the position of the slider, ``slider`` of a law: the force
-depends on the gap less this position alone, so that shifted gaps give the forces of every start.
+A spring whose slider never moves keeps its initial state for ever. The start is the slider position, the field
+``slider`` of a law. Forces depend only on the gap minus this position, so that shifted gaps give the forces of any
+start.
 """
 
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -26,7 +27,7 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import input_error
 
-FORGETS = (BoucWen, Dahl)  # a mean force relaxes over many cycles: the steady one is unique
+FORGETS = (BoucWen, Dahl)  # a mean force relaxes over many cycles, so that the steady force is unique
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,9 @@ class Starts:
     given
         Interface with the initial positions of the model.
     first
-        (n_contacts + 1,) contact c of the model is contacts first[c] to before first[c + 1] of `interface`.
+        (n_contacts + 1,) contact c of the model consists of contacts first[c] to before first[c + 1] of `interface`.
     stiffness
-        (n, 2) stiffness of each spring along t and w, N/m; zero where no spring with a free start exists.
+        (n, 2) stiffness of each spring along t and w, N/m; zero if its start is not free.
     planar
         (n,) whether the friction force is limited as a vector in the plane.
     friction, constant
@@ -58,7 +59,7 @@ class Starts:
     constant: FloatArray
 
     def limits(self, normal: FloatArray) -> FloatArray:
-        """Return the friction limits, N, under normal forces (n, ...), which are positive in compression."""
+        """Return the friction limits, N, for normal forces (n, ...), which are positive in compression."""
         shape = (-1,) + (1,) * (normal.ndim - 1)
         pushed = self.friction.reshape(shape) * np.maximum(normal, 0.0)
         return np.asarray(pushed + self.constant.reshape(shape))
@@ -117,7 +118,7 @@ def starts_of(interface: Interface) -> Starts:
 
 
 def _parts(name: str, law: ContactLaw) -> list[ContactLaw]:
-    """Return the laws side by side that a law is."""
+    """Return the parallel laws of which a law consists."""
     if isinstance(law, Iwan):
         return [_of_element(row) for row in law.elements() if np.any(row[[K_T, K_W, K_N]])]
     if isinstance(law, RigidCoulomb):
@@ -155,19 +156,19 @@ def _without_start(law: Any) -> ContactLaw:
 
 
 def _holds(law: ContactLaw) -> bool:
-    """Whether a law pulls along its tangents when stuck: a law with normal springs alone keeps no traction."""
+    """Whether a law resists tangential displacement when stuck; with normal springs only, it keeps no traction."""
     return bool(np.any(law.stuck_stiffness()[:2] > 0.0))
 
 
 def _of_element(row: FloatArray) -> ContactLaw:
-    """Return an elementary contact of constant limit as a law."""
+    """Return an elementary contact with constant limit as a law."""
     k_t, k_w, k_n = (float(row[k]) for k in (K_T, K_W, K_N))
     if np.isinf(row[PRELOAD]):
         return Bonded(k_t=k_t, k_w=k_w, k_n=k_n)
     return Jenkins(k_t=k_t, k_w=k_w, k_n=k_n, limit=float(row[PRELOAD]))
 
 
-OneSlider = ElasticCoulomb | CoupledCoulomb  # under the normal force, with a place to start from
+OneSlider = ElasticCoulomb | CoupledCoulomb  # laws with one slider, whose limit follows the normal force
 
 
 def freezable(name: str, law: ContactLaw) -> bool:
@@ -183,7 +184,7 @@ def freezable(name: str, law: ContactLaw) -> bool:
     Raises
     ------
     InputError
-        If the state of the law is more than the position of one slider, or the law prescribes its start.
+        If the state of the law is more than one slider position, or the law prescribes its start.
     """
     if isinstance(law, OneSlider):
         if isinstance(law, ElasticCoulomb) and law.residual_traction is not None:
@@ -204,12 +205,18 @@ def freezable(name: str, law: ContactLaw) -> bool:
 
 
 def sharing_friction(law: ContactLaw, share: float) -> ContactLaw:
-    """Return a law with a share of its friction coefficient and springs unstretched at zero displacement; laws without a slider are unchanged."""
+    """Return a law with a share of its friction coefficient and springs unstretched at zero displacement.
+
+    Laws without a slider are unchanged.
+    """
     return replace(law, mu=share * law.mu, slider=None) if isinstance(law, OneSlider) else law
 
 
 def left_behind(law: ContactLaw, gap: FloatArray, force: FloatArray) -> ContactLaw:
-    """Return a law whose slider starts so that the spring has the `force` (3,) at the `gap` (3,); laws without a slider are unchanged."""
+    """Return a law whose slider starts where the spring has the `force` (3,) at the `gap` (3,).
+
+    Laws without a slider are unchanged.
+    """
     if not isinstance(law, OneSlider):
         return law
     k = law.stuck_stiffness()

@@ -1,4 +1,4 @@
-"""Contact points: pairs, their laws, and the operator from displacements to gaps."""
+"""Contact points: their laws, and the operator from displacements to gaps."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -22,15 +22,16 @@ class Interface:
     Parameters
     ----------
     names
-        One name a contact, e.g. ``L1.2``.
+        One name per contact, e.g. ``L1.2``.
     laws
-        One law a contact.
+        One law per contact.
     gap_operator
-        (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``. The contact forces act on the structure as
-        ``gap_operator.T @ force``, on the left side of the equation of motion. Dense or sparse; stored as `scipy.sparse.csr_array`
-        without zeros, because a contact acts on a few coordinates of thousands.
+        (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``. The contact forces act on the
+        structure as ``gap_operator.T @ force``, on the left side of the equation of motion. Dense or sparse; stored as
+        `scipy.sparse.csr_array` without zeros, because a contact acts on a few coordinates of thousands.
     weights
-        (n_contacts,) factors of the forces of each law, such as the area of a point where laws are given per area; None: ones.
+        (n_contacts,) factors of the forces of each law, such as the area of a point if laws are given per area; None:
+        ones.
 
     Raises
     ------
@@ -93,11 +94,11 @@ class Interface:
 
     @property
     def rigid(self) -> bool:
-        """Whether a contact is rigid: its force is no function of its gap."""
+        """Whether a contact is rigid, so that its force is not a function of its gap."""
         return any(isinstance(law, Rigid) for law in self.laws)
 
     def sprung(self, stiffness: float) -> "Interface":
-        """Return the interface with springs of `stiffness` (N/m) in place of rigid contacts."""
+        """Return the interface with springs of `stiffness` (N/m) instead of rigid contacts."""
         return replace(self, laws=softened(self.laws, stiffness))
 
     def coordinates(self) -> IntArray:
@@ -119,7 +120,7 @@ def _without_zeros(gap_operator: Matrix) -> Matrix:
 
 @dataclass(frozen=True, eq=False)
 class SparseRows:
-    """Gap operator by contact: the columns with entries of each contact, and its 3 values in each."""
+    """Gap operator, sorted by contact: the nonzero columns of each contact, and its 3 values in each column."""
 
     columns: IntArray  # (n_contacts, width); unused entries repeat column 0 with value 0
     values: FloatArray  # (n_contacts, 3, width)
@@ -136,7 +137,7 @@ class SparseRows:
 
 
 def sparse_rows(gap_operator: Matrix) -> SparseRows:
-    """Return the (3 n_contacts, n) `gap_operator`, dense or sparse, by contact."""
+    """Return the (3 n_contacts, n) `gap_operator`, dense or sparse, sorted by contact."""
     operator = _without_zeros(gap_operator)
     starts = operator.indptr[::3]
     used = [np.unique(operator.indices[a:b]) for a, b in pairwise(starts)]
@@ -164,7 +165,10 @@ def add_gaps(columns, values, vector, gap):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def add_forces(columns, values, force, out):  # type: ignore[no-untyped-def]
-    """Add the forces on the coordinates from contact forces `force` (m, 3 n_contacts) to `out` (m, n); `columns` and `values` from `sparse_rows`."""
+    """Add the forces on the coordinates from contact forces `force` (m, 3 n_contacts) to `out` (m, n).
+
+    `columns` and `values` come from `sparse_rows`.
+    """
     for q in range(out.shape[0]):
         for c in range(columns.shape[0]):
             for j in range(columns.shape[1]):
@@ -194,7 +198,7 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
     n_contacts, n_pairs, m, _ = blocks.shape
     width = columns.shape[1]
     local = np.empty((3, 3))
-    stride, place = (np.uintp(n), columns.astype(np.uintp))  # no sign to be looked at in the inner loop
+    stride, place = (np.uintp(n), columns.astype(np.uintp))  # unsigned, for the inner loop
     for c in range(n_contacts):
         b, own = values[c], place[c]
         for q in range(m):

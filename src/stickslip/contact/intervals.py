@@ -1,13 +1,13 @@
 """Forces and derivatives of elastic Coulomb contacts over one period, by intervals of constant state.
 
-Between two changes of state the force is linear in the gap, and the derivative of a sticking spring depends only on the last
-sample that did not stick (slip and lift-off erase memory). A derivative block is therefore a sum over the few intervals of
-``sum b_i b_i^T`` and ``(sum b_i) b_a^T``, with ``b`` the Fourier basis (1, cos, sin, ...) at a sample and ``a`` the anchor
-sample; products of basis functions are sums of cosines and sines of the sum and the difference of their orders, so that both come
-from one table of prefix sums (cf. Petrov & Ewins 2003, who do the same with exact event times).
+Between two changes of state the force is linear in the gap, and the derivative of a sticking spring depends only on the
+last sample that did not stick, the anchor (slip and lift-off erase memory). A derivative block is therefore a sum over
+the few intervals of ``sum b_i b_i^T`` and ``(sum b_i) b_a^T``, with ``b`` the Fourier basis (1, cos, sin, ...) at a
+sample and ``a`` the anchor. Products of basis functions are cosines and sines of sums and differences of their orders,
+so that both terms come from one table of prefix sums (cf. Petrov & Ewins 2003, who use exact event times).
 
-Two periods are marched. That is enough, not an approximation: one period maps the tangential force T to clip(T + k Δx, lo, hi)
-composed over the samples, which is again a clip, and the net Δx over a period is zero, so the map is idempotent.
+Two periods are marched, which is exact. One period maps the tangential force T to clip(T + k Δx, lo, hi) composed over
+the samples, which is again a clip. The net Δx over a period is zero, so the map is idempotent.
 """
 
 import numpy as np
@@ -82,10 +82,10 @@ def _outer(cos_row, sin_row, basis_row, order, factor, out):  # type: ignore[no-
 
 @njit(cache=True)
 def _first_period(x, limit, is_open, k, start):  # type: ignore[no-untyped-def]
-    """March one Jenkins spring over the first period; return its anchor, the sign of the slip there, and the force there.
+    """March one Jenkins spring over the first period; return its anchor, and sign of slip and force there.
 
-    The anchor is the sample whose force and position fix the spring while it sticks (-1: none, the spring starts unstretched at zero
-    displacement). The sign is 0 for a sample at which the contact was open.
+    The anchor is the sample whose force and position determine the spring while it sticks (-1: none, the spring starts
+    unstretched at zero displacement). The sign is 0 if the contact was open at the anchor.
     """
     n = x.size
     a, sign, held, place = -1, 0.0, 0.0, 0.0
@@ -105,13 +105,13 @@ def _first_period(x, limit, is_open, k, start):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _march_tangent(x, limit, is_open, k, start, force, state, spans, signs):  # type: ignore[no-untyped-def]
-    """March one Jenkins spring with the limit of each sample over two periods; add the force of the second one to `force`.
+    """March one Jenkins spring over two periods, with a limit per sample; add the force of the second to `force`.
 
     Returns
     -------
     int
-        Number of rows of `spans`: first sample, state, and anchor of each interval of constant state, with the `signs` of the slip, or
-        of that at the anchor.
+        Number of rows of `spans`: first sample, state, and anchor of each interval of constant state, with the sign of
+        the slip in `signs`, for stick at the anchor.
     """
     a, sign, held = _first_period(x, limit, is_open, k, start)
     place = x[a] if a >= 0 else 0.0
@@ -176,7 +176,10 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _normal(gap, row, force, limit, is_open):  # type: ignore[no-untyped-def]
-    """Add the normal force; fill the limit of friction and where the contact is open. Return the slope of the limit by the gap."""
+    """Add the normal force, and fill the friction limit and whether the contact is open.
+
+    Return the slope of the limit by the gap.
+    """
     k_n, mu, preload = row[K_N], row[MU], row[PRELOAD]
     if row[UNILATERAL] == 0.0:
         for i in range(gap.size):
@@ -212,7 +215,7 @@ def _closed_sums(is_open, cos_table, sin_table, cos_sum, sin_sum):  # type: igno
 
 @njit(cache=True)
 def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks, work):  # type: ignore[no-untyped-def]
-    """Add the force and the blocks of one elementary contact; `work` holds the arrays it needs on the way."""
+    """Add the force and the blocks of one elementary contact; `work` contains work arrays."""
     n = gap.shape[1]
     order = (basis.shape[1] - 1) // 2
     limit, is_open, spans, signs, sums = work
@@ -223,7 +226,7 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
     for d in range(2):
         k = row[d]
         if k == 0.0:
-            # a direction without stiffness carries no force
+            # without stiffness there is no force along the direction
             for i in range(n):
                 state[d, i] = OPEN if is_open[i] else STICK
             continue
@@ -235,7 +238,10 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
 
 @njit(cache=True)
 def _merge(state, other):  # type: ignore[no-untyped-def]
-    """Merge the state of one more element into that of the contact, which slips unless all elements stick or all are open."""
+    """Merge the state of a further element into the state of the contact.
+
+    The contact slips unless all elements stick or all are open.
+    """
     for d in range(2):
         for i in range(state.shape[1]):
             if state[d, i] != other[d, i]:
@@ -284,10 +290,11 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
     force
         Out: (n_contacts, 3, samples) contact forces (T_t, T_w, -N) in N.
     state
-        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where they differ.
+        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where
+        they differ.
     blocks
-        Out: (n_contacts, P, m, m) derivatives of Fourier coefficients of the force by those of the gap, m = 2 order + 1, of which the
-        first five differ from zero: t by t, w by w, n by n, t by n, w by n.
+        Out: (n_contacts, P, m, m) derivatives of the Fourier coefficients of the force by those of the gap, m = 2 order
+        + 1. Only the first five differ from zero: t by t, w by w, n by n, t by n, w by n.
     """
     _contacts(0, gap.shape[0], gap, elements, first, basis, cos_table, sin_table, force, state, blocks)
 
@@ -296,7 +303,7 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
 def contact_period_threads(  # type: ignore[no-untyped-def]
     shares, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
 ):
-    """Evaluate as `contact_period`, in `shares` that are distributed over threads."""
+    """Evaluate like `contact_period`, in `shares` that are distributed over threads."""
     n = gap.shape[0]
     for share in prange(shares):
         _contacts(

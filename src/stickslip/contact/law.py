@@ -1,8 +1,9 @@
-"""The protocol of contact laws: parameters in a frozen dataclass, behaviour in one compiled step.
+"""Protocol of contact laws: parameters in a frozen dataclass, behaviour in one compiled step.
 
-The step maps displacement, velocity and state at one sample of one contact to force and new state, with the derivatives of that map. It
-owns nothing, so that the same law serves harmonic balance and the static preload. All steps share one signature: the marcher is compiled once, against that
-signature, and takes the step as a first-class function; a law of a user's script costs its own compilation and nothing else.
+The step maps displacement, velocity and state at one sample of one contact to force and new state, with the derivatives
+of this map. It has no data of its own, so that the same law serves harmonic balance and the static preload. All steps
+have the same signature: the marching code is compiled once for this signature and receives the step as a first-class
+function. For a law in a user's script, only its step is compiled.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,7 +18,7 @@ from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.units import quantity_of
 
-STICK, SLIP, OPEN = 0, 1, 2  # what a step says of each tangent
+STICK, SLIP, OPEN = 0, 1, 2  # status of a tangent
 
 # Derivative blocks of a contact, force by gap, in the order of `ContactPeriod.blocks`; a law fills the first 5, 7 or 9.
 TT, WW, NN, TN, WN, TW, WT, NT, NW = range(9)
@@ -62,7 +63,7 @@ Law = TypeVar("Law", bound=ContactLaw)
 
 
 def check_law_members(place: str, law: object) -> None:
-    """Refuse what is no contact law, before any computation.
+    """Refuse an object that is not a contact law, before any computation.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def check_law_members(place: str, law: object) -> None:
     Raises
     ------
     InputError
-        If it is a class or no dataclass, or lacks a member.
+        If it is a class or not a dataclass, or lacks a member.
     """
     name = law.__name__ if isinstance(law, type) else type(law).__name__
     if isinstance(law, type):
@@ -83,7 +84,7 @@ def check_law_members(place: str, law: object) -> None:
         raise input_error(
             place, f"is the text {law!r}", "Give a law with its parameters: stickslip.Jenkins(k_t=2e4, limit=2.0)."
         )
-    known = dir(law)  # to read a kernel is to compile it
+    known = dir(law)  # `dir` does not read the kernel, which would compile it
     lacking = [] if isinstance(law, Rigid) else [member for member in MEMBERS if member not in known]
     if lacking:
         remedy = "docs/extending.md shows a law; stickslip.contact.check_law tries one."
@@ -95,12 +96,15 @@ def check_law_members(place: str, law: object) -> None:
 
 
 def scaled(law: Law, factor: float) -> Law:
-    """Return the law whose forces are `factor` times those of `law`: a share of an interface, or a pressure times an area.
+    """Return the law whose forces are `factor` times those of `law`.
+
+    The factor is a share of an interface, or the area for a law per area.
 
     Parameters
     ----------
     law
-        A dataclass whose force-like fields are marked as ``shared`` (`stickslip.units.quantity`); a field ``preload`` always counts.
+        A dataclass whose force-like fields are marked as ``shared`` (`stickslip.units.quantity`); a field ``preload``
+        always counts.
     factor
         Above zero.
 
@@ -128,7 +132,7 @@ def scaled(law: Law, factor: float) -> Law:
 
 @runtime_checkable
 class Restoring(Protocol):
-    """A law without memory whose force may oppose a displacement although its stiffness at rest is zero."""
+    """A law without memory whose force may oppose large displacements although its stiffness at rest is zero."""
 
     def restores(self) -> BoolArray:
         """Return the (3,) directions t, w, n along which the force opposes every large displacement."""
@@ -136,14 +140,14 @@ class Restoring(Protocol):
 
 
 def holding_directions(law: ContactLaw) -> BoolArray:
-    """Return the (3,) directions t, w, n along which a closed, sticking contact has stiffness."""
+    """Return the (3,) directions t, w, n along which a closed, sticking contact opposes displacements."""
     holds = law.stuck_stiffness() > 0.0
     return holds | law.restores() if isinstance(law, Restoring) else holds
 
 
 @runtime_checkable
 class Rigid(Protocol):
-    """A law whose force is no function of its gap: a sticking contact does not move, and solvers find its force as a reaction.
+    """A law whose force is not a function of its gap: a sticking contact does not move, and its force is a reaction.
 
     Attributes
     ----------
@@ -170,7 +174,7 @@ class Rigid(Protocol):
 
 
 def softened(laws: Iterable[ContactLaw], stiffness: float) -> tuple[ContactLaw, ...]:
-    """Return the laws with springs of `stiffness` (N/m) in place of rigid ones."""
+    """Return the laws with springs of `stiffness` (N/m) instead of rigid contacts."""
     return tuple(law.softened(stiffness) if isinstance(law, Rigid) else law for law in laws)
 
 
@@ -201,7 +205,7 @@ class PlanarFriction(Protocol):
 
 @runtime_checkable
 class NormalContact(Protocol):
-    """A law of planar friction whose normal force is that of a piecewise-linear contact, whose transitions can be located.
+    """A law of planar friction with the normal force of a piecewise-linear contact, whose transitions can be located.
 
     Attributes
     ----------
@@ -213,7 +217,7 @@ class NormalContact(Protocol):
     def mu(self) -> float: ...  # noqa: D102
 
     def normal_contact(self) -> PiecewiseLinear | None:
-        """Return the law without friction; None where the normal force is constant."""
+        """Return the law without friction; None if the normal force is constant."""
         ...
 
 
@@ -228,7 +232,7 @@ class ResidualTraction(Protocol):
 
 @runtime_checkable
 class PressedOrOpen(Protocol):
-    """A law that takes its state at rest as a preload or as a clearance, never both."""
+    """A law whose state at rest is either a preload or a clearance, never both."""
 
     def at_rest(self, preload: float, gap: float) -> ContactLaw:
         """Return the law with a further normal force, N, and a further clearance, m, at rest."""
@@ -242,29 +246,34 @@ def law_kernel(step: Callable[..., None]) -> Any:
     ----------
     step
         Function ``step(displacement, velocity, state, parameters, force, new_state, jac, status)`` that numba can
-        compile. It reads the first four and fills the others: ``force`` (3,) = (T_t, T_w, -N) in N, ``new_state`` (n_state,),
-        ``jac`` (3 + n_state, 6 + n_state) derivatives of force and new state by displacement, velocity and state (it arrives
-        zeroed), ``status`` (2,) what each tangent does: 0 stick, 1 slip, 2 open.
+        compile. It reads the first four and fills the others: ``force`` (3,) = (T_t, T_w, -N) in N, ``new_state``
+        (n_state,), ``jac`` (3 + n_state, 6 + n_state) derivatives of force and new state by displacement, velocity and
+        state (zero on entry), ``status`` (2,) of each tangent: 0 stick, 1 slip, 2 open.
 
     Returns
     -------
     object
-        Value of the class attribute `kernel` of the law, without an annotation; the step is compiled when the attribute is first read.
+        Value of the class attribute `kernel` of the law, without an annotation; the step is compiled when the attribute
+        is first read.
 
     Notes
     -----
-    The compiled code is stored on disk beside the file of the step. A step typed at a prompt has no file and is compiled anew.
+    The compiled code is stored on disk beside the file of the step. A step typed at a prompt has no file and is
+    compiled in every session.
     """
     return _Kernel(step)
 
 
 def kernel_in(name: str) -> Any:
-    """Return the kernel of a step in ``contact/steps``; its module, and numba, are imported when the kernel is first read."""
+    """Return the kernel of a step in ``contact/steps``.
+
+    Its module is imported, with numba, when the kernel is first read.
+    """
     return _Kernel(name)
 
 
 class _Kernel:
-    """Compiles a step, or loads it, when a law's kernel is first asked for: a study file is judged before."""
+    """Descriptor that compiles or loads a step when the kernel is first read, after the check of a study file."""
 
     def __init__(self, step: Callable[..., None] | str) -> None:
         self.step = step

@@ -8,18 +8,20 @@ from stickslip.errors import InputError, input_error
 
 ALLOWED = (5, 7, 9)
 RELATIVE_STEP = 1e-6
-PART = 1e-3  # of the displacements: how far two gaps lie apart whose pressures are compared
-ROUNDING = 1e-12  # of the largest stiffness: below, one is zero
-KINK = 1e-3  # difference of both sides, relative to the largest outcome, at which a kink is near: nothing is said there
-WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides is a hundred times smaller
+PART = 1e-3  # distance of the two gaps whose pressures are compared, relative to the displacements
+ROUNDING = 1e-12  # relative to the largest stiffness; smaller ones are zero
+# difference of the one-sided differences, relative to the largest output, above which the point is at a kink and not
+# checked
+KINK = 1e-3
+WRONG = 1e-4  # largest error, relative to the largest output; curvature contributes a hundredth of this
 
 
 def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0) -> None:
-    """Check a law along a random path: its derivatives by finite differences, the sign of its normal stiffness, its stuck stiffness.
+    """Check a law along a random path: derivatives by finite differences, sign of the normal stiffness, stuck stiffness.
 
-    A positive normal gap is open: the pressure ``N = -force[2]`` must not grow with it. A law that never opens, such as a spring of negative
-    stiffness, may pull the other way if its `stuck_stiffness` says so. Preload and gap are not checked: they
-    need the fields ``preload`` and ``k_n``.
+    A positive normal gap is open, so the pressure ``N = -force[2]`` must not grow with it. A law that never opens, such
+    as a spring of negative stiffness, may pull the other way if its `stuck_stiffness` says so. Preload and gap are not
+    checked: they need the fields ``preload`` and ``k_n``.
 
     Parameters
     ----------
@@ -35,9 +37,9 @@ def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int 
     Raises
     ------
     InputError
-        If `pairs` is none of 5, 7, 9 or leaves out a block that differs from zero, an output is not filled, a derivative is wrong,
-        the pressure grows as the bodies part, `stuck_stiffness` is none that the law has where it sticks, or each point was next to a kink; the message
-        names the entry and both numbers.
+        If `pairs` is not 5, 7 or 9 or omits a nonzero block, an output is not filled, a derivative is wrong, the
+        pressure grows as the bodies separate, `stuck_stiffness` differs from the stiffness of the sticking law, or
+        every point was at a kink; the message names the entry and both numbers.
     """
     if law.pairs not in ALLOWED:
         raise _refused(law, f"pairs is {law.pairs}", "Give 5, 7 or 9 (see ContactLaw).")
@@ -64,7 +66,7 @@ def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int 
 
 
 def _at_rest(law: ContactLaw, size: float) -> list[FloatArray]:
-    """Return the point of no displacement, and one that is pressed, each without velocity and with the state that the first step leaves."""
+    """Return two points without velocity, with zero displacement and pressed, after one step from the initial state."""
     stops = []
     for gap in (0.0, -size):
         point = np.concatenate([[0.0, 0.0, gap, 0.0, 0.0, 0.0], law.initial_state()])
@@ -74,7 +76,7 @@ def _at_rest(law: ContactLaw, size: float) -> list[FloatArray]:
 
 
 def _check_normal(law: ContactLaw, stops: list[FloatArray], size: float) -> None:
-    """Refuse a pressure that grows as the bodies part, seen where the contact is closed with the least gap."""
+    """Refuse a pressure that grows as the bodies separate, at the closed point with the smallest gap."""
     seen = [(abs(point[2]), i, _step(law, point)) for i, point in enumerate(stops)]
     closed = [(gap, i) for gap, i, (_, _, status) in seen if not np.any(status == OPEN)]
     springs = len(closed) == len(stops) and law.stuck_stiffness()[2] < 0.0  # on purpose
@@ -94,7 +96,10 @@ def _check_normal(law: ContactLaw, stops: list[FloatArray], size: float) -> None
 
 
 def _check_stuck(law: ContactLaw, stops: list[FloatArray]) -> None:
-    """Refuse a stuck stiffness that lies beyond all that the law has where it sticks; of a linear law they are one number."""
+    """Refuse a stuck stiffness outside the range of the law's stiffnesses where it sticks.
+
+    A linear law has only one.
+    """
     own = np.asarray(law.stuck_stiffness(), dtype=float)
     if own.shape != (3,):
         raise _refused(law, f"stuck_stiffness has the shape {own.shape}", "Return t, w, n.")
@@ -121,7 +126,7 @@ def _check_stuck(law: ContactLaw, stops: list[FloatArray]) -> None:
 
 
 def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return force and new state, their derivatives, and what each tangent does, at one sample."""
+    """Return force and new state, their derivatives, and the status of each tangent, at one sample."""
     n = point.size - 6
     force, new_state = np.full(3, np.nan), np.full(n, np.nan)
     jac, status = np.zeros((3 + n, 6 + n)), np.full(2, -1, dtype=np.int64)
@@ -137,7 +142,7 @@ def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray, I
 def _compare(
     law: ContactLaw, point: FloatArray, out: FloatArray, jac: FloatArray, out_scale: FloatArray, in_scale: FloatArray
 ) -> int:
-    """Compare all derivatives at one point and return how many columns were not at a kink."""
+    """Compare all derivatives at one point and return the number of columns that were not at a kink."""
     for pair in PAIRS[law.pairs : FULLY_COUPLED]:
         if jac[pair] != 0.0:
             raise _refused(

@@ -1,4 +1,4 @@
-"""Steps of one contact law along given gaps, compiled: tangents at samples, and those of a period chained over the parts of each step."""
+"""Compiled steps of one contact law along given gaps: tangents at samples, and over whole steps with several parts."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from stickslip.contact.cache import njit
 _matrix = types.float64[:, ::1]
 _cube = types.float64[:, :, ::1]
 _AT = types.void(
-    types.int64,  # where the step of the law begins
+    types.int64,  # address of the law's step
     _matrix,  # gap
     _matrix,  # velocity
     _matrix,  # starts
@@ -20,7 +20,7 @@ _AT = types.void(
     _cube,  # out
 )
 _ALONG = types.void(
-    types.int64,  # where the step of the law begins
+    types.int64,  # address of the law's step
     types.int64,  # first
     _matrix,  # gap
     _matrix,  # velocity
@@ -53,7 +53,10 @@ def _tangents_at(address, gap, velocity, starts, part, parameters, out):  # type
 
 @njit(cache=True)
 def _chain(jac, carried, share, line):  # type: ignore[no-untyped-def]
-    """Fill the (3 + s, 9 + s) derivatives after a part of a step by gap, velocity, state and the gap before of the whole step."""
+    """Fill the (3 + s, 9 + s) derivatives after a part of a step.
+
+    They are by gap, velocity, state and previous gap of the whole step.
+    """
     s = carried.shape[0]
     for a in range(3 + s):
         for b in range(9 + s):
@@ -71,14 +74,14 @@ def _chain(jac, carried, share, line):  # type: ignore[no-untyped-def]
 def _steps_along(address, first, gap, velocity, state, parameters, share, samples, starts, whole):  # type: ignore[no-untyped-def]
     """March a law along gaps and velocities (parts, 3) from its part `first`; `state` (s,) is changed in place.
 
-    `samples` are the parts that end a step, `share` (parts,) tells where between both ends of its step each part ends. Filled are the states
-    `starts` (parts, s) with which the parts begin, and `whole` (samples, 3 + s, 9 + s): the derivatives of force and new state of a step by gap,
-    velocity and state, and by the gap at the sample before.
+    `samples` are the parts that end a step; `share` (parts,) is the position of each part's end within its step. The
+    function fills the states `starts` (parts, s) with which the parts begin, and `whole` (samples, 3 + s, 9 + s): the
+    derivatives of force and new state of a step by gap, velocity and state, and by the gap at the previous sample.
     """
     step = law_at(address)
     s = state.size
     jac, line = np.zeros((3 + s, 6 + s)), np.zeros((3 + s, 9 + s))
-    carried = np.zeros((s, 9 + s))  # of the state, by what a whole step begins and ends with
+    carried = np.zeros((s, 9 + s))  # derivatives of the state by the gaps, velocity and state of the whole step
     force, new, status = np.empty(3), np.empty(s), np.empty(2, np.int64)
     for a in range(s):
         carried[a, 6 + a] = 1.0

@@ -1,4 +1,7 @@
-"""Friction coefficient and tangential stiffness from measured hysteresis loops, by least squares, with their covariance, and warnings about what the loops do not determine."""
+"""Friction coefficient and tangential stiffness from measured hysteresis loops, by least squares.
+
+The fit returns their covariance, and warnings about parameters that the loops do not determine.
+"""
 
 import math
 from collections.abc import Sequence
@@ -12,18 +15,19 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.loop_model import RIGID_STIFFNESS, Loop, LoopModel
 from stickslip.errors import input_error
 
-MIN_LOOP_SAMPLES = 8  # samples of a recording
-CLEAR = 25.0  # what slip, or stick, must take off the sum of squares, in variances of a sample
-SURE = 5.0  # standard deviations beyond which a slope has a sign
-FLOOR = 1e-9  # of the force's swing: residuals below are rounding
-KEPT = 1e-7  # singular value, relative to the largest, below which a combination of unknowns is not told
-TOLD = 1e-3  # part of a parameter in such a combination from which on it is not told
-TRIED = (np.geomspace(1.0, 300.0, 24), np.linspace(0.4, 1.0, 13))  # stiffnesses and limits, in those of the loop
-FOLLOWS = 0.3  # correlation of neighbouring residuals from which on they are no independent noise
-MANY = 30  # samples below which a correlation says nothing
-DRIFTS = 5.0  # standard deviations of a trend of the residuals that count
-NOISY = 0.5  # of the residual: noise of the displacement, times the stiffness
-_FOURTH = math.sqrt(70.0)  # standard deviation of fourth differences of noise of one
+MIN_LOOP_SAMPLES = 8  # smallest number of samples of a recording
+CLEAR = 25.0  # least reduction of the sum of squares by slip, or stick, in variances of a sample
+SURE = 5.0  # standard deviations beyond which the sign of a slope is certain
+FLOOR = 1e-9  # relative to the force's swing; smaller residuals are rounding
+KEPT = 1e-7  # singular value, relative to the largest, below which a combination of unknowns is undetermined
+TOLD = 1e-3  # share of a parameter in such a combination above which the parameter is undetermined
+# initial stiffnesses and limits, relative to those of the loop
+TRIED = (np.geomspace(1.0, 300.0, 24), np.linspace(0.4, 1.0, 13))
+FOLLOWS = 0.3  # correlation of neighbouring residuals above which they are not independent noise
+MANY = 30  # samples below which a correlation has no meaning
+DRIFTS = 5.0  # standard deviations above which a trend of the residuals is reported
+NOISY = 0.5  # share of the residual above which noise of the displacement, times the stiffness, is reported
+_FOURTH = math.sqrt(70.0)  # standard deviation of fourth differences of noise with standard deviation one
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,7 +91,7 @@ class LoopFit:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """A fit in the terms of the measurement."""
+    """A fit in the quantities of the measurement."""
 
     stiffness: float
     limit: float
@@ -109,24 +113,26 @@ def fit_loops(
 ) -> LoopFit:
     """Fit tangential stiffness and friction coefficient to hysteresis loops of force over displacement.
 
-    The law is `ElasticCoulomb` under a constant normal load, evaluated along the measured displacements. First it is decided whether the
-    loops show slip and stick at all: each must reduce the sum of squares by 25 variances.
+    The law is `ElasticCoulomb` under a constant normal load, evaluated along the measured displacements. The first step
+    is to decide whether the loops show slip and stick at all: each must reduce the sum of squares by 25 variances.
 
     Parameters
     ----------
     loops
         Recordings: displacements (n,) in m and forces (n,) in N, in the order of time, as `read_loops` returns them.
     normal_load, normal_load_deviation
-        Normal force in N, the same in all recordings, and its standard deviation; without a load only the limit force is found.
+        Normal force in N, the same in all recordings, and its standard deviation; without a load only the limit force
+        is found.
     machine_stiffness
-        Stiffness in N/m of the machine in series with the contact, between the points of the displacement measurement; None: rigid.
+        Stiffness in N/m of the machine in series with the contact, between the points of the displacement measurement;
+        None: rigid.
     offset, drift
         Whether the force of each recording has an unknown offset, and a drift linear in time.
 
     Returns
     -------
     LoopFit
-        Estimates with their covariance, as if the errors of the forces were independent and equally large.
+        Estimates with their covariance, assuming independent and equally large errors of the forces.
 
     Raises
     ------
@@ -155,7 +161,7 @@ def fit_loops(
 
 
 def _checked(loops: Sequence[Loop]) -> tuple[Loop, ...]:
-    """Return the recordings as arrays; refuse what no contact can be fitted to."""
+    """Return the recordings as arrays; refuse recordings to which no contact can be fitted."""
     found = []
     for j, loop in enumerate(loops):
         x, force = (np.asarray(values, dtype=float) for values in loop)
@@ -193,7 +199,7 @@ def _check_numbers(load: float | None, deviation: float, machine: float | None) 
 
 
 def _simplest(model: LoopModel) -> _Found:
-    """Return the fit of a contact that only sticks, or only slips, where the loops do not show that it does both."""
+    """Return the fit of a contact that only sticks or only slips, unless the loops show both."""
     line, always = _stuck(model), _slipping(model)
     stiff, moving = (one.values[0] / one.deviation for one in (model.line(), model.direction()))
     if min(stiff, moving) < -SURE and max(stiff, moving) < SURE:
@@ -212,7 +218,7 @@ def _simplest(model: LoopModel) -> _Found:
 
 
 def _least(model: LoopModel, found: _Found) -> tuple[float, float]:
-    """Return lower bounds of stiffness and limit where the loop does not determine them."""
+    """Return lower bounds of stiffness and limit if the loop does not determine them."""
     if not found.slips.any():
         return math.nan, found.stiffness * model.stroke
     return (_least_stiffness(model, found) if math.isnan(found.stiffness) else math.nan), math.nan
@@ -256,7 +262,7 @@ def _both(model: LoopModel) -> _Found:
     freedom = max(model.measured.size - z.size, 1)
     own = 2 * solved.cost / freedom * _covariance(solved.jac) * np.outer(units, units)
     slips = model.friction(z[0] * k_unit, z[1] * unit, unit * z[2 : 2 + n])[1]
-    slips[model.first] = 0.0  # of before
+    slips[model.first] = 0.0  # the state at a first sample is unknown
     if model.offset and not model.both_ways(slips):
         own[1, :], own[:, 1] = math.nan, math.nan
     values = np.where(np.isfinite(np.diag(own)), z[:2] * units, math.nan)
@@ -266,7 +272,7 @@ def _both(model: LoopModel) -> _Found:
 
 
 def _start(model: LoopModel) -> FloatArray:
-    """Return the unknowns that fit best among a grid of stiffnesses and limits."""
+    """Return the best-fitting unknowns from a grid of stiffnesses and limits."""
     unit = model.swing
     middle = [(f.max() + f.min()) / 2 if model.offset else 0.0 for _, f in model.loops]
     held = np.array([f[0] - m for (_, f), m in zip(model.loops, middle, strict=True)])
@@ -297,7 +303,10 @@ def _covariance(jac: FloatArray) -> FloatArray:
 
 
 def _least_stiffness(model: LoopModel, found: _Found) -> float:
-    """Return the smallest stiffness whose sum of squares is not worse by four variances: two standard deviations."""
+    """Return the smallest stiffness whose sum of squares is worse by at most four variances.
+
+    These are two standard deviations.
+    """
     size = model.measured.size
     variance = max(found.squares / max(size - found.unknowns, 1), (FLOOR * model.swing) ** 2)
     if math.isnan(found.limit) or not model.both_ways(found.slips):
@@ -315,7 +324,7 @@ def _least_stiffness(model: LoopModel, found: _Found) -> float:
 
 
 def _without_machine(found: _Found, machine: float | None) -> tuple[float, FloatArray]:
-    """Remove the stiffness in series from the fitted one."""
+    """Subtract the compliance in series from the fitted stiffness."""
     if machine is None or math.isnan(found.stiffness):
         return found.stiffness, found.covariance
     if found.stiffness >= machine:
@@ -325,12 +334,12 @@ def _without_machine(found: _Found, machine: float | None) -> tuple[float, Float
             "Give the stiffness of the machine alone, or measure the displacement nearer to the contact.",
         )
     share = machine / (machine - found.stiffness)
-    slope = np.array([share**2, 1.0])  # derivatives by what was found
+    slope = np.array([share**2, 1.0])  # derivatives by the fitted values
     return found.stiffness * share, found.covariance * np.outer(slope, slope)
 
 
 def _of_setup(load: float | None, machine: float | None, found: _Found) -> list[str]:
-    """Return a sentence on quantities that no loop determines."""
+    """Return sentences about quantities that no loop determines."""
     told = []
     if load is None and math.isfinite(found.limit):
         told.append("The normal load is not given: the limit force is told, the friction coefficient is not")
@@ -397,7 +406,7 @@ def _parts(model: LoopModel, values: FloatArray) -> list[FloatArray]:
 
 
 def _correlation(model: LoopModel, away: FloatArray) -> float:
-    """Return the correlation of neighbouring residuals; 0 where they are rounding."""
+    """Return the correlation of neighbouring residuals; 0 if they are only rounding."""
     parts = _parts(model, away)
     size = sum(float(np.sum(part**2)) for part in parts)
     if size <= (1e-9 * model.swing) ** 2 * away.size:
@@ -406,7 +415,7 @@ def _correlation(model: LoopModel, away: FloatArray) -> float:
 
 
 def _inflation(correlation: float) -> float:
-    """Return the factor by which correlated residuals reduce standard deviations."""
+    """Return the factor by which correlated residuals make standard deviations too small."""
     held = min(max(correlation, 0.0), 0.999)
     return math.sqrt((1 + held) / (1 - held))
 
@@ -437,7 +446,7 @@ def _trend(model: LoopModel, away: FloatArray) -> list[str]:
 
 
 def _noisy(model: LoopModel, away: FloatArray, k_t: float) -> list[str]:
-    """Return a warning where the noise of the displacement, which least squares of the force neglect, is as large as the residual."""
+    """Return a warning if the noise of the displacement, which the fit neglects, is comparable to the residual."""
     if math.isnan(k_t):
         return []
     rough = [np.diff(x, 4) / _FOURTH for x, _ in model.loops]

@@ -1,7 +1,7 @@
 """Model of a measured hysteresis loop: elastic Coulomb friction under a constant normal load.
 
-A recording has unknowns of its own beside stiffness and limit: the force that the spring holds at the first sample, the offset of the
-force sensor, and its drift. The friction force is a piecewise linear function of all of them.
+Besides stiffness and limit, each recording has its own unknowns: the spring force at the first sample, the offset of
+the force sensor, and its drift. The friction force is a piecewise linear function of all of them.
 """
 
 import math
@@ -15,7 +15,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.prescribed_gap import forces_along
 
-RIGID_STIFFNESS = 1e6  # times the force's range over that of the displacement: a spring that slips at once
+RIGID_STIFFNESS = 1e6  # times the force range over the displacement range: a spring that slips almost at once
 Loop = tuple[FloatArray, FloatArray]
 
 
@@ -52,7 +52,7 @@ class LoopModel:
 
     @property
     def stuck(self) -> float:
-        """Stiffness of a line from end to end, N/m: the scale of stiffnesses."""
+        """Stiffness of a straight line between the ends of the loop, N/m: the scale of stiffnesses."""
         return self.swing / self.stroke
 
     @cached_property
@@ -115,7 +115,10 @@ class LoopModel:
         return _line(np.stack([moved / self.stroke, *intercepts, *drifts], axis=1), self.measured, self.stroke)
 
     def direction(self) -> "Line":
-        """Fit a contact that always slips; the first value is the limit. First samples are left out: their direction of slip is unknown."""
+        """Fit a contact that always slips; the first value is the limit.
+
+        First samples are left out, because their direction of slip is unknown.
+        """
         columns = np.column_stack([self.signs, self.sensor])
         known = np.delete(np.arange(self.signs.size), self.first)
         fit = _line(columns[known], self.measured[known])
@@ -131,7 +134,11 @@ class LoopModel:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A linear fit: its values, the standard deviation of the first value, whether the loops determine this value, sum of squares, fitted forces."""
+    """A linear fit.
+
+    Its fields are the values, the standard deviation of the first value, whether the loops determine this value, the
+    sum of squares, and the fitted forces.
+    """
 
     values: FloatArray
     deviation: float
@@ -141,7 +148,7 @@ class Line:
 
 
 def _line(columns: FloatArray, measured: FloatArray, unit: float = 1.0) -> Line:
-    """Fit by least squares; the first column is one in units of `unit`."""
+    """Fit by least squares; the first column is divided by `unit`."""
     inverse = np.linalg.pinv(columns, rcond=1e-10)
     values = inverse @ measured
     fitted = columns @ values
@@ -149,6 +156,6 @@ def _line(columns: FloatArray, measured: FloatArray, unit: float = 1.0) -> Line:
     rank = int(np.linalg.matrix_rank(columns, tol=1e-8))
     variance = squares / max(measured.size - rank, 1) * float(inverse[0] @ inverse[0])
     values[0] /= unit
-    # rounding alone is no certainty
+    # an exact fit up to rounding does not mean certainty
     deviation = max(math.sqrt(variance) / unit, 1e-12 * abs(float(values[0])), 1e-300)
     return Line(values, deviation, rank == columns.shape[1], squares, fitted)

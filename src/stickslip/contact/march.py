@@ -1,11 +1,12 @@
 """Forces and derivatives of any contact law over one period, sample by sample.
 
-The state is marched from its start until it is periodic; derivatives by the Fourier coefficients of the gaps travel with it. One period is
-enough for a law without memory, two for independent tangents. Other laws forget their start only gradually: a planar Coulomb contact near
-incipient slip or a Dahl contact in micro-slip would take hundreds of periods. From the third period on, the derivative of the state after a
-period by the state before it is marched, too, and one Newton step a period is made towards the state that repeats. It also says how far the
-state is from that one, which the change over a period alone does not where the start is forgotten slowly. A direction that keeps the memory
-of its start for ever, as a spring that only sticks, is left where marching brought it.
+The state is marched from its start until it is periodic, with its derivatives by the Fourier coefficients of the gaps.
+One period is enough for a law without memory, two for independent tangents. Other laws forget their start only
+gradually: a planar Coulomb contact near incipient slip or a Dahl contact in micro-slip would take hundreds of periods.
+From the third period on, the derivative of the state after a period by the state before it is therefore marched, too,
+and each period is followed by one Newton step towards the periodic state. The step also measures the distance to that
+state, for which the change over a period is no measure if the start is forgotten slowly. Directions that never forget
+their start, as of a spring that only sticks, stay where marching brought them.
 """
 
 from functools import cache
@@ -19,17 +20,17 @@ from stickslip.contact.cache import njit
 from stickslip.contact.law import PAIRS
 
 MAX_PERIODS = 400
-ROUNDING = 1e-14  # change over a period that counts as none, as a share of the state's range
+ROUNDING = 1e-14  # change over a period that counts as zero, as a share of the state's range
 SETTLED = 1e-12  # largest distance from the periodic state, in the same measure
-# times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
+# times ROUNDING: residual after a Newton step that counts as rounding if the start is forgotten slowly
 NOISE = 10.0
-ROWS = 1e3  # the same two numbers are larger by this factor for derivatives
-KEPT = 1e-11  # singular value below which a direction is said to keep its memory for ever
+ROWS = 1e3  # factor on ROUNDING and SETTLED for derivatives
+KEPT = 1e-11  # singular value below which a direction never forgets its start
 
 _PAIRS = np.array(PAIRS)
 _cube = types.float64[:, :, ::1]
 _SIGNATURE = types.void(
-    types.int64,  # where the step of the law begins
+    types.int64,  # address of the law's step
     types.float64[:, ::1],  # parameters
     types.float64[:, ::1],  # start
     _cube,  # gap
@@ -47,7 +48,10 @@ _SIGNATURE = types.void(
 
 @njit(cache=True)
 def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega, first, count):  # type: ignore[no-untyped-def]
-    """Chain the derivatives of a step, `count` rows of its jac from row `first`, with those of the state (`rows`, `by_omega`)."""
+    """Chain the derivatives of a step with the derivatives of the state (`rows`, `by_omega`).
+
+    Of the step's jac, `count` rows from row `first` are used.
+    """
     n_state, m = rows.shape[0], basis_row.size
     for a in range(count):
         line = jac[first + a]
@@ -84,7 +88,7 @@ def _blocks_of(rows, basis, blocks):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _load(c, i, gap, velocity, omega, u, v, v_by_omega):  # type: ignore[no-untyped-def]
-    """Take displacement, velocity and its derivative by ω out of the period."""
+    """Read displacement, velocity and its derivative by ω at sample `i`."""
     for a in range(3):
         u[a] = gap[c, a, i]
         v[a] = velocity[c, a, i]
@@ -107,7 +111,10 @@ def _carry_map(jac, period_map, new_map):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _workspace(n_state, n_pairs, n_samples, m):  # type: ignore[no-untyped-def]
-    """Arrays that a march writes on: of a sample, of derivatives, the ranges of the state, and derivatives of the force on samples."""
+    """Allocate the work arrays of a march.
+
+    They are for a sample, for derivatives, for the ranges of the state, and for derivatives of the force on samples.
+    """
     of_state = (n_state, 3, m)
     return (
         (
@@ -147,7 +154,7 @@ def _one_period(  # type: ignore[no-untyped-def]
     state,
     by_omega,
 ):
-    """March one contact over a period from the state `s`; its derivatives, and with `track` the `period_map`, go along."""
+    """March one contact over a period from the state `s`, with its derivatives and, if `track`, the `period_map`."""
     u, v, v_by_omega, f, new, jac, status = work[0]
     new_rows, new_omega, force_rows, f_omega, new_map = work[1]
     low, high = work[2]
@@ -182,7 +189,7 @@ def _one_period(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _scales(ranges, largest_gap, scale, row_scale, rows):  # type: ignore[no-untyped-def]
-    """Set the size of each state and of its derivatives, below which rounding hides a change."""
+    """Set the scale of each state and of its derivatives, relative to which rounding hides a change."""
     low, high = ranges
     for a in range(scale.size):
         size = max(high[a] - low[a], abs(high[a]), abs(low[a]))
@@ -199,15 +206,16 @@ def _largest(change, scale):  # type: ignore[no-untyped-def]
     for a in range(scale.size):
         size = np.max(np.abs(change[a])) / scale[a]
         if not size <= out:
-            out = size  # not a number counts as large, too
+            out = size  # NaN counts as large, too
     return out
 
 
 @njit(cache=True)
 def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # type: ignore[no-untyped-def]
-    """Turn the changes over a period into the steps that bring state and derivatives to those that repeat, in place.
+    """Convert the changes over a period into the steps to the periodic state and its derivatives, in place.
 
-    They solve ``(1 - M) step = change`` with the period map M; by least squares, without the directions that M keeps.
+    They solve ``(1 - M) step = change`` with the period map M, by least squares without the directions that M never
+    forgets.
     """
     n_state = scale.size
     matrix = np.empty((n_state, n_state))
@@ -234,7 +242,7 @@ def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # typ
 def _settle(  # type: ignore[no-untyped-def]
     step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work, force, state, by_omega
 ):
-    """March contact `c` from the state `s` until it is periodic; return the periods this took, or -1."""
+    """March contact `c` from the state `s` until it is periodic; return the number of periods, or -1."""
     n_state = s.size
     scale, row_scale = np.empty(n_state), np.empty(n_state)
     period_map = np.empty((n_state, n_state))
@@ -304,7 +312,7 @@ def _settle(  # type: ignore[no-untyped-def]
         if plain > 0:
             plain -= 1
         elif moved > 0.5 * last or not np.isfinite(distance + row_distance):
-            # the last step led nowhere: march on from where it was made
+            # the last step made it worse: march on from the state before it
             s[:], rows[:], s_omega[:] = safe, safe_rows, safe_omega
             last, plain, patience = np.inf, patience, 2 * patience
         else:
@@ -316,14 +324,14 @@ def _settle(  # type: ignore[no-untyped-def]
 
 @cache
 def period_march() -> Any:
-    """Return `march_period`, compiled at first use: this takes half a minute, which exact events do not need."""
+    """Return `march_period`, compiled at first use: compiling takes half a minute, and exact events do not need it."""
     return njit(_SIGNATURE, cache=True)(march_period)
 
 
 def march_period(  # type: ignore[no-untyped-def]
     address, parameters, start, gap, velocity, basis, basis_rate, omega, force, state, blocks, by_omega, periods
 ):
-    """March contacts of one law until they are periodic; forces and derivatives are those of the last period.
+    """March contacts of one law until they are periodic; return forces and derivatives of the last period.
 
     Parameters
     ----------
@@ -346,7 +354,7 @@ def march_period(  # type: ignore[no-untyped-def]
     by_omega
         Out: (n, 3, samples) derivative of the force by ω at fixed coefficients.
     periods
-        Out: (n,) periods marched; -1 if the state did not repeat within the largest number.
+        Out: (n,) number of periods marched; -1 if the state did not become periodic within `MAX_PERIODS`.
     """
     step = law_at(address)
     n_samples, m = basis.shape

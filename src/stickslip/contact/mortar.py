@@ -1,4 +1,4 @@
-"""Two surfaces tied in the mean: the nodes of one follow those of the other (mortar method, standard multipliers; Puso 2004)."""
+"""Mortar tie of two surfaces: displacements agree in a weighted mean (standard multipliers; Puso 2004)."""
 
 import numpy as np
 import scipy
@@ -9,16 +9,16 @@ from stickslip.contact.segmentation import segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
-MAX_UNCOVERED = 1e-3  # share of side A that may stand beyond side B
+MAX_UNCOVERED = 1e-3  # share of side A that may extend beyond side B
 ROUNDING_WEIGHT = 1e-14  # weights below are rounding
 
 
 def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: BoolArray | None = None) -> Matrix:
-    """Return the weights by which the nodes of side A follow those of side B.
+    """Return the weights by which the nodes of side A follow the nodes of side B.
 
-    The difference of both sides' displacements vanishes in the mean over side A, weighted by each of its shape functions:
-    ``D u_A = M u_B`` with ``D = ∫ N_A N_Aᵀ`` and ``M = ∫ N_A N_Bᵀ``. On plane surfaces a constant stress passes exactly through any two
-    meshes of triangles and parallelograms.
+    The difference of the displacements vanishes in the mean over side A, weighted by each of its shape functions:
+    ``D u_A = M u_B`` with ``D = ∫ N_A N_Aᵀ`` and ``M = ∫ N_A N_Bᵀ``. On plane surfaces a constant stress passes exactly
+    through any two meshes of triangles and parallelograms.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: Bool
     reach
         Largest distance of partners, m; None: the radius of the largest facet.
     held
-        (n_A,) supported nodes of A, where B is supported too: their rows are empty, and the difference vanishes in the mean
-        weighted by the shape functions of the other nodes; None: no such nodes.
+        (n_A,) supported nodes of A where B is supported too: their rows are empty, and the difference vanishes in the
+        mean weighted by the shape functions of the other nodes; None: no such nodes.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None, held: Bool
     Raises
     ------
     InputError
-        If nodes of A span no facet, or A reaches beyond B.
+        If a node of A belongs to no facet, or A extends beyond B.
     """
     loose = np.setdiff1d(np.arange(len(a.points)), a.used)
     if loose.size or not len(a.facets):

@@ -1,4 +1,4 @@
-"""Contacts between neighbouring sectors of a wheel: shrouds, platforms that touch."""
+"""Contacts between neighbouring sectors of a wheel, such as shrouds or touching platforms."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ def neighbour_interface(
     axis: Axis = Z_AXIS,
     normal: FloatArray | None = None,
 ) -> Interface:
-    """Pair the nodes of the high face of every sector with those of the low face of the next one.
+    """Pair the nodes of the high face of every sector with the nodes of the low face of the next sector.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def neighbour_interface(
     axis
         Axis of the wheel.
     normal
-        (3,) unit normal of sector 0's high face, out of it; None: that of the plane through its nodes.
+        (3,) outward unit normal of sector 0's high face; None: normal of the plane through its nodes.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def neighbour_interface(
     Raises
     ------
     InputError
-        If the sets do not fit each other, or the nodes of a face lie in no plane.
+        If the sets do not match, or the nodes of a face do not lie in a plane.
     """
     pitch = 2 * np.pi / sectors
     frame = _frame(wheel, (f"sector0.{low}", f"sector0.{high}"), axis, normal)

@@ -1,7 +1,7 @@
-"""Kinematics of a contact: which points of two surfaces touch, and the operator from displacements to their gaps.
+"""Kinematics of a contact: pairs of touching points of two surfaces, and the operator from displacements to their gaps.
 
-Three ways, from the cheapest to the most exact: node to node, node to segment, and segment to segment at quadrature points ("Mortar-like",
-Krack, Salles & Thouverez 2017, section 2.2).
+There are three methods, from the cheapest to the most exact: node to node, node to segment, and segment to segment at
+quadrature points ("Mortar-like", Krack, Salles & Thouverez 2017, section 2.2).
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from stickslip.errors import InputError, input_error
 
 PARALLEL = 1e-3  # sine of the smallest angle between the direction of t and a normal
 LISTED = 5  # points that a message names
-RIM = 1e-6  # overhang that is rounding, as a share of a facet's size
+RIM = 1e-6  # overhang below which it is rounding, as a share of a facet's size
 
 Direction = FloatArray | tuple[float, float, float]
 
@@ -92,7 +92,7 @@ def contact_frames(normal: FloatArray, direction: Direction) -> FloatArray:
 def node_to_node(
     a: Surface, b: Surface, *, tolerance: float, direction: Direction = (1.0, 0.0, 0.0), outside: Outside = "error"
 ) -> Pairing:
-    """Pair each node of side A with the nearest node of side B: for matching meshes.
+    """Pair each node of side A with the nearest node of side B, for matching meshes.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def node_to_node(
     direction
         Its part in the tangent plane is the tangent t; one for all nodes of A, or (n, 3).
     outside
-        What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
+        Treatment of nodes of A without a partner: ``"error"`` or ``"skip"``.
 
     Raises
     ------
@@ -156,9 +156,9 @@ def node_to_segment(
     direction: Direction = (1.0, 0.0, 0.0),
     outside: Outside = "error",
 ) -> Pairing:
-    """Pair each node of side A with its closest point on the facets of side B: for non-matching meshes.
+    """Pair each node of side A with its closest point on the facets of side B, for non-matching meshes.
 
-    Simple and cheap, but a uniform pressure is not transferred exactly. Let A be the side with the finer mesh.
+    The method is simple and cheap, but does not transfer a uniform pressure exactly. Side A should have the finer mesh.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def node_to_segment(
     direction
         Its part in the tangent plane is the tangent t; one for all nodes of A, or (n, 3).
     outside
-        What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
+        Treatment of nodes of A without a partner: ``"error"`` or ``"skip"``.
 
     Raises
     ------
@@ -229,10 +229,10 @@ def segment_to_segment(
     direction: Direction = (1.0, 0.0, 0.0),
     outside: Outside = "error",
 ) -> Pairing:
-    """Pair quadrature points on the common pieces of both sides' facets: "Mortar-like" contact.
+    """Pair quadrature points on the intersections of both sides' facets: "Mortar-like" contact.
 
-    On plane surfaces a uniform pressure is transferred exactly between any two meshes of triangles and parallelograms. Points lie on side
-    A, and their partners along its normal, so that a pair of normal forces has no moment.
+    On plane surfaces a uniform pressure is transferred exactly between any two meshes of triangles and parallelograms.
+    Points lie on side A, and their partners along its normal, so that a pair of normal forces has no moment.
 
     Parameters
     ----------
@@ -241,13 +241,13 @@ def segment_to_segment(
     reach
         Largest distance of partners, m; None: the radius of the largest facet.
     degree
-        Polynomials integrated exactly on each piece; None: products of the shape functions of both sides. The degree of the shape functions
-        of one side suffices to transfer a uniform pressure, with fewer points.
+        Polynomials integrated exactly on each piece; None: products of the shape functions of both sides. The degree of
+        the shape functions of one side suffices to transfer a uniform pressure, with fewer points.
     direction
         Its part in the tangent plane is the tangent t.
     outside
-        Treatment of facets of A without any partner: ``"error"`` or ``"skip"``. A facet that
-        reaches beyond side B takes part where it faces B.
+        Treatment of facets of A without any partner: ``"error"`` or ``"skip"``. A facet that extends beyond side B is
+        used where it faces B.
 
     Raises
     ------
@@ -296,7 +296,7 @@ def _pairing(
     weights: FloatArray,
     unpaired: IntArray,
 ) -> Pairing:
-    """Put a pairing together from points of A and B and the operators to their displacements."""
+    """Return the pairing from points of A and B and the operators to their displacements."""
     p = len(places)
     blocks = (frames.transpose(0, 2, 1), np.arange(p), np.arange(p + 1))
     to_frame = scipy.sparse.bsr_array(blocks, shape=(3 * p, 3 * p))
@@ -319,7 +319,7 @@ def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
 def _without_partner(
     place: str, a: Surface, nodes: IntArray, distance: FloatArray, partner: str, remedy: str, **words: str
 ) -> InputError:
-    """Name the nodes of side A without a partner: number, place, and how far the next one is."""
+    """Return the error that names nodes of side A without a partner, with their positions and distances."""
     worst = np.argsort(-distance)[:LISTED]
     listed = [
         f"node {_numbers(a, nodes[[i]])[0]} at ({', '.join(f'{round(x, 12):.6g}' for x in a.points[nodes[i]])}) m"

@@ -1,4 +1,4 @@
-"""Forces of a contact law along any path of the gap, sample by sample: the law's own step and nothing else."""
+"""Forces of a contact law along any path of the gap, sample by sample, by the law's own step."""
 
 from functools import cache
 from typing import Any
@@ -12,12 +12,12 @@ from stickslip.contact.cache import njit
 from stickslip.contact.law import ContactLaw
 
 _SIGNATURE = types.void(
-    types.int64,  # where the step of the law begins
+    types.int64,  # address of the law's step
     types.float64[::1],  # parameters
     types.float64[::1],  # state, changed
     types.float64[:, ::1],  # gap
     types.float64[:, ::1],  # force
-    types.int64[:, ::1],  # what each tangent does
+    types.int64[:, ::1],  # status of each tangent
 )
 
 
@@ -47,7 +47,7 @@ def forces_along(law: ContactLaw, gap: FloatArray, start: FloatArray | None = No
 
 @cache
 def _walk() -> Any:
-    """Return `_march`, compiled when it is first asked for."""
+    """Return `_march`, compiled at first use."""
     return njit(_SIGNATURE, cache=True)(_march)
 
 

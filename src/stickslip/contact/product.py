@@ -12,7 +12,7 @@ from stickslip.contact.cache import njit
 from stickslip.contact.law import PAIRS
 
 _PAIRS = np.array(PAIRS)  # force and gap direction of each block
-_SUMS = {"reassoc", "contract"}  # sums in any order: else no sum is vectorised
+_SUMS = {"reassoc", "contract"}  # sums may be reordered: otherwise they are not vectorised
 
 
 @njit(cache=True, nogil=True)
@@ -77,7 +77,7 @@ def contact_product(blocks, columns, values, vector, transposed, gap, force, out
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def subtract_lower(blocks, columns, values, vector, before, first, last, factor, gap, out):  # type: ignore[no-untyped-def]
-    """Subtract from the rows `first` to `last` of `out` the part of ``factor Bᵀ K B v`` that comes from coefficients before `first`.
+    """Subtract the part of ``factor Bᵀ K B v`` due to coefficients before `first` from rows `first` to `last` of `out`.
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ def subtract_lower(blocks, columns, values, vector, before, first, last, factor,
     vector
         (m, n) coefficients of the coordinates; only those before `first` are read.
     before, first, last
-        Gaps of the rows before `before` are in `gap` already; gaps of the rows from there to `first` are added to it.
+        `gap` already contains the gaps of the rows before `before`; the gaps of the rows from there to `first` are
+        added.
     factor
         Scale of the result.
     gap
@@ -109,7 +110,10 @@ def subtract_lower(blocks, columns, values, vector, before, first, last, factor,
 
 @njit(cache=True, nogil=True)
 def _multiply(real, imaginary, h, rows, out):  # type: ignore[no-untyped-def]
-    """Set the rows of harmonic `h` of `out` to the product with those of `rows`; both may be the same array for one row alone."""
+    """Set the rows of harmonic `h` of `out` to the product with the same rows of `rows`.
+
+    Both may be the same array, for one row only.
+    """
     n = rows.shape[1]
     first = max(2 * h - 1, 0)
     if h == 0:
@@ -137,7 +141,7 @@ def multiply_blocks(real, imaginary, rows, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _own_less_mean(block, real, imaginary, p, q):  # type: ignore[no-untyped-def]
-    """Return an entry of a block whose row and column belong to one harmonic, without the mean of that harmonic."""
+    """Return an entry of a block within one harmonic, minus the mean of that harmonic."""
     if p == q:
         return block[p, q] - real
     return block[p, q] - imaginary if q > p else block[p, q] + imaginary
@@ -155,7 +159,7 @@ def _any_below(block):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _any_above(block, real, imaginary):  # type: ignore[no-untyped-def]
-    """Return whether a force depends on its own harmonic (apart from means (H+1,)) or on higher ones."""
+    """Return whether a force depends on its own harmonic (beyond the means (H+1,)) or on higher ones."""
     for p in range(block.shape[0]):
         h = (p + 1) // 2
         for q in range(max(2 * h - 1, 0), 2 * h + 1):
@@ -169,7 +173,10 @@ def _any_above(block, real, imaginary):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _filled(blocks, real, imaginary, below, above):  # type: ignore[no-untyped-def]
-    """Return which blocks (n_contacts, P) have entries below the diagonal harmonics, and which have other entries that no mean represents."""
+    """Fill, for each block (n_contacts, P), whether it has entries in the lower and in the upper triangle.
+
+    The upper triangle includes the diagonal harmonics, except for the means.
+    """
     for c in range(blocks.shape[0]):
         for b in range(blocks.shape[1]):
             row, col = _PAIRS[b, 0], _PAIRS[b, 1]
@@ -206,14 +213,14 @@ def _laid_out(blocks, real, imaginary, below, lower, above, upper):  # type: ign
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Lower and upper triangle of the contact Jacobian by harmonics, in the layout for repeated products of a Krylov method.
+    """Lower and upper triangle of the contact Jacobian by harmonics, stored for repeated products of a Krylov method.
 
     Attributes
     ----------
     below, above
-        (k, 2) contacts and blocks that have entries there; contacts at rest have none.
+        (k, 2) contacts and blocks with entries in each triangle; stuck and open contacts have none.
     lower, upper
-        The entries one after the other: of `lower` harmonic by harmonic, of `upper` block by block; N/m.
+        The entries in sequence: of `lower` harmonic by harmonic, of `upper` block by block; N/m.
     """
 
     below: IntArray
@@ -223,14 +230,14 @@ class Triangles:
 
 
 def triangles(blocks: FloatArray, means: ComplexArray) -> Triangles:
-    """Split the derivatives of contact forces.
+    """Split the derivatives of contact forces into both triangles.
 
     Parameters
     ----------
     blocks
         (n_contacts, P, m, m), N/m.
     means
-        (H+1, n_contacts, 3, 3) what is left out of each harmonic's own entries, see `harmonic_means`.
+        (H+1, n_contacts, 3, 3) part of each harmonic's own entries that is left out, see `harmonic_means`.
     """
     real, imaginary = np.ascontiguousarray(means.real), np.ascontiguousarray(means.imag)
     m = blocks.shape[2]
@@ -245,7 +252,7 @@ def triangles(blocks: FloatArray, means: ComplexArray) -> Triangles:
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def _product_of(one, other):  # type: ignore[no-untyped-def]
-    """Return the sum of the products of the entries of `one` with the first ones of `other`."""
+    """Return the sum of the products of the entries of `one` with the first entries of `other`."""
     total = 0.0
     for q in range(one.size):
         total += one[q] * other[q]
@@ -254,7 +261,7 @@ def _product_of(one, other):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def _push(force, columns, values, factor, first, last, out):  # type: ignore[no-untyped-def]
-    """Add to the rows `first` to `last` of `out` what the forces (n_contacts, 3, m) of these rows do to the coordinates, times a factor."""
+    """Add the forces (n_contacts, 3, m) on the coordinates, times a factor, to the rows `first` to `last` of `out`."""
     for c in range(columns.shape[0]):
         for j in range(columns.shape[1]):
             for d in range(3):
@@ -266,7 +273,7 @@ def _push(force, columns, values, factor, first, last, out):  # type: ignore[no-
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def add_upper(above, upper, columns, values, scale, vector, gap, force, out):  # type: ignore[no-untyped-def]
-    """Add to `out` what the gaps of each harmonic and of higher ones do to its contact forces.
+    """Add to `out` the contact forces of each harmonic due to gaps of the same and of higher harmonics.
 
     Parameters
     ----------
@@ -297,7 +304,7 @@ def add_upper(above, upper, columns, values, scale, vector, gap, force, out):  #
 
 @njit(cache=True, nogil=True, fastmath=_SUMS)
 def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, force, out):  # type: ignore[no-untyped-def]
-    """Solve harmonic by harmonic, from the static one up, each with the contact forces of the harmonics below it.
+    """Solve harmonic by harmonic, from the static one up, including the contact forces due to lower harmonics.
 
     Parameters
     ----------
@@ -326,17 +333,17 @@ def sweep(real, imaginary, below, lower, columns, values, scale, rows, gap, forc
                 for p in range(first, last):
                     force[c, row, p] += _product_of(lower[i : i + first], gap[c, col])
                     i += first
-            # what is subtracted comes from solved rows; it goes into rows that are not solved yet
+            # forces due to solved rows are subtracted from rows that are not solved yet
             _push(force, columns, values, -scale, first, last, rows)
         _multiply(real, imaginary, h, rows, out)
         before, first = first, last
 
 
 def harmonic_means(blocks: FloatArray) -> ComplexArray:
-    """Return the part of `blocks` by which each harmonic of a force depends on the same harmonic of a gap, as complex numbers.
+    """Return the complex factors by which each harmonic of a force depends on the same harmonic of a gap.
 
-    A block acts on ``(C_h, S_h)`` as a real 2 × 2 matrix ``[a b; c d]``; the nearest multiplication of ``C_h - i S_h`` by a complex number
-    is that by ``(a + d)/2 + i (b - c)/2``.
+    A block acts on ``(C_h, S_h)`` as a real 2 × 2 matrix ``[a b; c d]``; the closest multiplication of ``C_h - i S_h``
+    by a complex number has the factor ``(a + d)/2 + i (b - c)/2``.
 
     Parameters
     ----------
@@ -361,7 +368,10 @@ def harmonic_means(blocks: FloatArray) -> ComplexArray:
 
 
 def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
-    """Return `blocks` minus the blocks that `means` represent; `means` come from `harmonic_means`, perhaps of other blocks."""
+    """Return `blocks` minus the part that `means` represent.
+
+    The means come from `harmonic_means`, possibly of other blocks.
+    """
     left = blocks.copy()
     for pair, (force, gap) in enumerate(_PAIRS[: blocks.shape[1]]):
         mean = means[:, :, force, gap].T
@@ -378,7 +388,10 @@ def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _add_stiffness(stiffness, columns, values, forces, out):  # type: ignore[no-untyped-def]
-    """Add ``Bᵀ k B`` of all contacts to `out` (n, n); `forces` (3, k) is the forces on one contact of unit coordinates."""
+    """Add ``Bᵀ k B`` of all contacts to `out` (n, n).
+
+    `forces` (3, k) is a work array: forces at one contact due to unit coordinates.
+    """
     for c in range(columns.shape[0]):
         for d in range(3):
             for j in range(columns.shape[1]):
@@ -394,7 +407,7 @@ def _add_stiffness(stiffness, columns, values, forces, out):  # type: ignore[no-
 def add_stiffness(
     stiffness: FloatArray | ComplexArray, columns: IntArray, values: FloatArray, out: FloatArray | ComplexArray
 ) -> None:
-    """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` a contact.
+    """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` per contact.
 
     Parameters
     ----------

@@ -8,15 +8,15 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.facets import REFERENCE_NODES, centres, corner_counts, normals, positions, tangents
 from stickslip.contact.surface import Surface
 
-MAX_GAUSS_NEWTON = 40  # of Gauss-Newton: linear convergence with the ratio gap / radius of curvature
-MAX_REFERENCE = 4.0  # reference coordinates beyond this belong to a neighbour: do not follow them further
-CONVERGED = 1e-12  # last step, in reference coordinates; the point itself is better than that
+MAX_GAUSS_NEWTON = 40  # largest number of iterations; convergence is linear with the ratio gap / radius of curvature
+MAX_REFERENCE = 4.0  # reference coordinates beyond this belong to a neighbouring facet
+CONVERGED = 1e-12  # last step, in reference coordinates; the point itself is more accurate
 INSIDE = 1e-12  # in reference coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Feet of the perpendiculars from p points to a surface.
+    """Perpendicular projections (feet) of p points on a surface.
 
     Parameters
     ----------
@@ -25,7 +25,8 @@ class Feet:
     reference
         (p, 2) reference coordinates of the foot.
     overhang
-        (p,) distance in metres by which the point lies beyond the rim of the surface, measured along the surface; infinite without a facet.
+        (p,) distance in metres by which the point lies beyond the rim of the surface, measured along the surface;
+        infinite without a facet.
     """
 
     facet: IntArray
@@ -36,14 +37,14 @@ class Feet:
 def near_pairs(
     centre: FloatArray, radius: FloatArray, others: FloatArray, radii: FloatArray, reach: float
 ) -> tuple[IntArray, IntArray]:
-    """Return all pairs (i, j) of balls that are nearer than `reach`, sorted by i.
+    """Return all pairs (i, j) of balls closer than `reach`, sorted by i.
 
     Parameters
     ----------
     centre, radius
         (p, 3) and (p,) balls.
     others, radii
-        (q, 3) and (q,) the other balls.
+        (q, 3) and (q,) other balls.
     reach
         Largest distance between two of them, m.
     """
@@ -73,7 +74,7 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
     points
         (p, 3) positions in metres.
     outward
-        (p, 3) outward normals of the body with the points; only facets with an opposite normal are considered.
+        (p, 3) outward normals at the points; only facets with an opposite normal are considered.
     surface
         The other side.
     reach
@@ -84,7 +85,7 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
     facing = normals(surface.points, surface.facets, centres(surface.facets))
     keep = np.einsum("pc,pc->p", outward[point], facing[facet]) < 0
     point, facet = point[keep], facet[keep]
-    # a facet whose ball begins beyond the middle of another one cannot be the closest
+    # a facet whose ball is farther away than the centre of another facet cannot be the closest
     apart = np.linalg.norm(points[point] - middle[facet], axis=1)
     bound = np.full(len(points), np.inf)
     np.minimum.at(bound, point, apart)
@@ -112,7 +113,8 @@ def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: fl
 def closest(points: FloatArray, facets: IntArray, target: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the closest point of one facet to each target: reference coordinates (p, 2) and its edge (p,), -1 inside.
 
-    Gauss-Newton on the distance; if the result lies outside the facet, the closest point of the edges.
+    The method is Gauss-Newton on the distance; if the result lies outside the facet, the closest point of its edges is
+    taken.
     """
     reference = centres(facets)
     for _ in range(MAX_GAUSS_NEWTON):
@@ -141,7 +143,9 @@ def closest(points: FloatArray, facets: IntArray, target: FloatArray) -> tuple[F
 
 
 def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return where the line through each origin across both axes meets a facet, or its continuation.
+    """Return the intersection of lines with facets or their continuation.
+
+    Each line passes through its origin, perpendicular to both axes.
 
     Parameters
     ----------
@@ -157,7 +161,7 @@ def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatAr
     Returns
     -------
     reference : (p, 2) reference coordinates
-    missed : indices of lines that meet no point of their facet, because it is folded or parallel to them
+    missed : indices of lines that do not meet their facet, because it is folded or parallel to them
     """
     reference = centres(facets)
     size = np.abs(points[facets] - origin[:, None]).max(axis=(1, 2))
@@ -174,7 +178,7 @@ def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatAr
 
 
 def _solve_two(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve many systems of two equations; a singular one gets no step."""
+    """Solve many systems of two equations; the solution of a singular one is zero."""
     (a, b), (c, d) = matrix.transpose(1, 2, 0)
     determinant = a * d - b * c
     usable = determinant != 0
@@ -211,7 +215,7 @@ def _closest_on_edge(
 
 
 def _rim(facets: IntArray) -> tuple[BoolArray, IntArray]:
-    """Return which edges (m, 4) belong to one facet only, and the nodes on them."""
+    """Return which edges (m, 4) belong to one facet only, and the nodes on these edges."""
     corners = corner_counts(facets)
     ends, owner = [], []
     for e in range(int(corners.max())):
@@ -227,7 +231,7 @@ def _rim(facets: IntArray) -> tuple[BoolArray, IntArray]:
 
 
 def _on_rim(facets: IntArray, facet: IntArray, reference: FloatArray, edge: IntArray) -> BoolArray:
-    """Return whether feet found on an edge (-1: inside) lie on the rim of the surface, or on a node of it."""
+    """Return whether feet on an edge (-1: inside) lie on the rim of the surface, or on one of its nodes."""
     rim_edge, rim_node = _rim(facets)
     corners = corner_counts(facets[facet])
     at_rim_node = np.zeros(len(facet), dtype=bool)

@@ -1,8 +1,8 @@
-"""Contact segments: the common pieces of the facets of two surfaces, and quadrature points on them, on both sides.
+"""Contact segments: intersections of the facets of two surfaces, with quadrature points on both sides.
 
-Segments as in Puso & Laursen (2004): the facets of side B are projected on the plane of each facet of side A and clipped there
-(Sutherland & Hodgman 1974), so that no shape function has a kink inside a piece. Triangles are integrated by symmetric rules with positive weights
-and inner points (Dunavant 1985; Strang & Fix 1973).
+Segments as in Puso & Laursen (2004): the facets of side B are projected on the plane of each facet of side A and
+clipped there (Sutherland & Hodgman 1974), so that no shape function has a kink inside a piece. Triangles are integrated
+by symmetric rules with positive weights and interior points (Dunavant 1985; Strang & Fix 1973).
 """
 
 from dataclasses import dataclass
@@ -71,10 +71,12 @@ def triangle_rule(degree: int) -> tuple[FloatArray, FloatArray]:
     return np.array(points), np.array(weights)
 
 
-STRAIGHT = 1e-9  # mid nodes nearer to the edge than this share of its length do not bend it
-ON_EDGE = 1e-12  # corners nearer to a clipping edge than this share of it lie on it
-SLIVER = 1e-10  # pieces smaller than this share of the smaller cell are rounding
-# a facet with curved edges: cells (corners; triangles repeat their last) between points at these reference places
+# distance of mid nodes from a straight edge, as a share of its length, up to which the edge counts as straight
+STRAIGHT = 1e-9
+ON_EDGE = 1e-12  # distance of corners from a clipping edge, as a share of its length, up to which they lie on it
+SLIVER = 1e-10  # area of a piece, as a share of the smaller cell, below which it is rounding
+# division of a facet with curved edges into cells (corners; triangles repeat the last one) between these reference
+# points
 _PARTS = {
     6: (REFERENCE_NODES[6], np.array([[0, 3, 5, 5], [3, 1, 4, 4], [5, 4, 2, 2], [3, 4, 5, 5]])),
     8: (
@@ -86,7 +88,7 @@ _PARTS = {
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Quadrature points on the common pieces of two surfaces, in the plane of side A.
+    """Quadrature points on the intersections of two surfaces, in the plane of side A.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ class Segments:
 def cells_of(surface: Surface) -> tuple[FloatArray, IntArray]:
     """Return the (c, 4, 3) corners of polygons that cover the facets, and the (c,) facet of each.
 
-    A facet with straight edges is one cell, one with curved edges several; triangles repeat their last corner.
+    A facet with straight edges is one cell, a facet with curved edges several; triangles repeat their last corner.
     """
     corners, owner = [], []
     kinds = kinds_of(surface.facets)
@@ -186,7 +188,7 @@ def clip(subject: FloatArray, window: FloatArray) -> tuple[FloatArray, IntArray]
 
 
 def _cut(polygon: FloatArray, count: IntArray, start: FloatArray, along: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Keep what lies to the left of the line from `start` along `along`."""
+    """Return the part of each polygon to the left of the line from `start` along `along`."""
     p, m, _ = polygon.shape
     column = np.arange(m)
     following = np.where(column + 1 < count[:, None], column + 1, 0)
@@ -207,7 +209,7 @@ def _cut(polygon: FloatArray, count: IntArray, start: FloatArray, along: FloatAr
 
 
 def _fan(polygons: FloatArray, count: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Split polygons into triangles: their polygon (t,), corners (t, 3, 2) and area (t,)."""
+    """Return the triangles of polygons: their polygon (t,), corners (t, 3, 2) and area (t,)."""
     row, last = np.nonzero(np.arange(2, polygons.shape[1]) < count[:, None])
     triangles = np.stack([polygons[row, 0], polygons[row, last + 1], polygons[row, last + 2]], axis=1)
     first, second = (triangles[:, 1:] - triangles[:, :1]).transpose(1, 0, 2)
@@ -249,7 +251,7 @@ def _plane_axes(cells: FloatArray, normal: FloatArray) -> FloatArray:
 def _facing_cells(
     cells_a: FloatArray, normal_a: FloatArray, cells_b: FloatArray, normal_b: FloatArray, reach: float
 ) -> tuple[IntArray, IntArray]:
-    """Return pairs of cells near each other whose normals point against each other."""
+    """Return pairs of cells close to each other with opposite normals."""
     middle_a, middle_b = cells_a.mean(axis=1), cells_b.mean(axis=1)
     radius_a = np.linalg.norm(cells_a - middle_a[:, None], axis=2).max(axis=1)
     radius_b = np.linalg.norm(cells_b - middle_b[:, None], axis=2).max(axis=1)
@@ -269,7 +271,7 @@ Outside = Literal["error", "skip"]
 
 @dataclass(frozen=True, eq=False)
 class SegmentPoints:
-    """Quadrature points on the common pieces of two sides' facets, on both sides.
+    """Quadrature points on the intersections of two sides' facets, on both sides.
 
     Parameters
     ----------
@@ -299,7 +301,7 @@ class SegmentPoints:
 def segment_points(
     a: Surface, b: Surface, *, reach: float | None = None, degree: int | None = None, outside: Outside = "error"
 ) -> SegmentPoints:
-    """Place quadrature points on the common pieces of two sides' facets; see `segment_to_segment`."""
+    """Place quadrature points on the intersections of two sides' facets; see `segment_to_segment`."""
     need_facets("segment_to_segment", a, b)
     radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
     reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
@@ -319,7 +321,7 @@ def segment_points(
     left = np.setdiff1d(np.arange(len(a.facets)), found.facet_a[near])
     if left.size and (outside == "error" or not near.any()):
         raise _without_facet(a, left, reach)
-    # the plane of a cell and the curved facet above it differ in area
+    # the plane of a cell and the curved facet above it have different areas
     own = normals(a.points, facets_a, on_a)
     plane = np.cross(found.axes[:, 0], found.axes[:, 1])
     tilt = np.einsum("pc,pc->p", own, plane) / np.linalg.norm(own, axis=1)
@@ -337,7 +339,7 @@ def segment_points(
 
 
 def _across(normal: FloatArray) -> FloatArray:
-    """Return two unit vectors (p, 2, 3) across each unit normal (p, 3)."""
+    """Return two unit vectors (p, 2, 3) perpendicular to each unit normal (p, 3)."""
     first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(normal, first)], axis=1)

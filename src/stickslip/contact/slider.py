@@ -1,10 +1,11 @@
 """The steady cycle of a Jenkins slider whose limits are trigonometric polynomials.
 
-In units of force the slider is at ``z = k x - T``, and friction keeps it between ``k x - μN`` and ``k x + μN``: it rests while the
-contact sticks, the lower wall pushes it while the contact slips forward, the upper one while it slips backward. Slip therefore ends at
-a maximum of the lower or a minimum of the upper wall, and begins where a wall passes the resting slider. Between the extrema of both
-walls and the changes of the sign of N the walls are monotone: clipping z at these nodes is exact, and each cell between two nodes
-holds at most one beginning of slip. Two periods are enough, as in `contact.intervals`: the map of z over a period is a clip.
+In units of force the slider is at ``z = k x - T``, and friction keeps it between the walls ``k x - μN`` and
+``k x + μN``. It rests while the contact sticks; the lower wall pushes it while the contact slips forward, the upper one
+while it slips backward. Slip therefore ends at a maximum of the lower or a minimum of the upper wall, and begins where
+a wall reaches the resting slider. The nodes are the extrema of both walls and the sign changes of N. Between nodes the
+walls are monotone, so that clipping z at the nodes is exact, and each cell between two nodes contains at most one onset
+of slip. Two periods are enough, as in `contact.intervals`, because the map of z over a period is a clip.
 """
 
 from typing import NamedTuple
@@ -35,7 +36,7 @@ class Scratch(NamedTuple):
     """Work arrays of the evaluation of a contact, of length m = 2H+1 unless stated otherwise."""
 
     normal: FloatArray  # pressure as long as it is positive
-    limit: FloatArray  # of friction
+    limit: FloatArray  # friction limit
     low: FloatArray  # walls of the slider
     high: FloatArray
     slope: FloatArray
@@ -148,7 +149,7 @@ def _evaluate_walls(low, high, nodes, kinds, count):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _clipped(z, i, nodes, anchor, by_normal, slip_by_normal):  # type: ignore[no-untyped-def]
-    """Return the slider's place at node `i` of a closed contact, its anchor, and its derivative by the normal gap there."""
+    """Return position, anchor and derivative by the normal gap (at the anchor) of the slider at node `i`."""
     if nodes[1, i] > z:
         return nodes[1, i], nodes[0, i], slip_by_normal
     if nodes[2, i] < z:
@@ -158,9 +159,10 @@ def _clipped(z, i, nodes, anchor, by_normal, slip_by_normal):  # type: ignore[no
 
 @njit(cache=True)
 def _closing_by_normal(x, normal, k, row, tau):  # type: ignore[no-untyped-def]
-    """Return the derivative of ``k x`` at the time of closing by the normal gap there: that time moves with the gap.
+    """Return the derivative of ``k x`` at the time of closing by the normal gap at that time.
 
-    A contact that sticks from then on has |k x'| <= μN', which bounds it.
+    The time of closing moves with the gap. A contact that sticks after closing has |k x'| <= μN', which bounds the
+    derivative.
     """
     rate = k * value_and_slope(x, tau)[1]
     closing_rate = value_and_slope(normal, tau)[1]
@@ -171,7 +173,10 @@ def _closing_by_normal(x, normal, k, row, tau):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _settle(z, anchor, by_normal, nodes, kinds, count, starts_open, slip_by_normal):  # type: ignore[no-untyped-def]
-    """Return the slider after one period: place, anchor, its derivative by the normal gap there (NaN: it closed there)."""
+    """Return the slider after one period: position, anchor, and derivative by the normal gap at the anchor.
+
+    The derivative is NaN if the contact closed at the anchor.
+    """
     is_open = starts_open
     for i in range(count):
         if kinds[i] == _CLOSING:
@@ -204,9 +209,9 @@ def _append(segments, count, start, state, sign, z, anchor, by_normal):  # type:
 
 @njit(cache=True)
 def _slip_start(wall, z, left, f_left, right, f_right):  # type: ignore[no-untyped-def]
-    """Return when the wall, monotone from `left` to `right`, passes the resting slider."""
+    """Return the time at which the wall, monotone from `left` to `right`, reaches the resting slider."""
     size, second, _ = bounds(wall)
-    # between two extrema a wall looks like half a wave
+    # between two extrema a wall resembles half a cosine wave
     share = np.arccos(1.0 - 2.0 * (z - f_left) / (f_right - f_left)) / np.pi
     guess = left + share * (right - left)
     return root_between(wall, z, left, f_left - z, right, f_right - z, guess, size + abs(z), second)
@@ -214,7 +219,10 @@ def _slip_start(wall, z, left, f_left, right, f_right):  # type: ignore[no-untyp
 
 @njit(cache=True)
 def _cell(i, z, anchor, by_normal, slip_by_normal, work, count):  # type: ignore[no-untyped-def]
-    """Append the segments of the closed cell after node `i`; return their number and the slider at its end."""
+    """Append the segments of the closed cell after node `i`.
+
+    Return their number and the slider at the end of the cell.
+    """
     nodes, segments = work.nodes, work.segments
     left, right = nodes[0, i], nodes[0, i + 1]
     moved, new_anchor, new_by_normal = _clipped(z, i + 1, nodes, anchor, by_normal, slip_by_normal)
@@ -258,7 +266,7 @@ def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes
 
 @njit(cache=True)
 def _start(row, slip_by_normal, starts_open, low, high):  # type: ignore[no-untyped-def]
-    """Return the slider just before t = 0: place, anchor, its derivative by the normal gap there."""
+    """Return the slider just before t = 0: position, anchor, and derivative by the normal gap at the anchor."""
     share = row[RESIDUAL]
     if np.isnan(share):
         return 0.0, NO_ANCHOR, 0.0
@@ -296,8 +304,9 @@ def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work)
     Returns
     -------
     int
-        Number of rows of ``work.segments``: start, state, sign of the slip, place of the resting slider, time at which it was left there
-        (or `NO_ANCHOR`), derivative of its place by the normal gap at that time.
+        Number of rows of ``work.segments``: start, state, sign of the slip, position of the resting slider, anchor
+        (time at which the slider came to rest there, or `NO_ANCHOR`), derivative of the position by the normal gap at
+        the anchor.
     """
     k = row[d]
     for p in range(x.size):
@@ -309,10 +318,10 @@ def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work)
             return _append(work.segments, 0, 0.0, OPEN, 0.0, 0.0, 0.0, 0.0)
         reach = z - work.low[0] + abs(work.low[0]) - bounds(work.low)[0]
         room = work.high[0] - z + abs(work.high[0]) - bounds(work.high)[0]
-        if min(reach, room) >= 0.0:  # no wall ever comes near
+        if min(reach, room) >= 0.0:  # no wall reaches the slider
             return _append(work.segments, 0, 0.0, STICK, 0.0, z, anchor, by_normal)
     if limit_slope == 0.0:
-        # both walls follow x, as do those of all such elements of a contact
+        # both walls follow x, as for all such elements of a contact: its extrema are computed once
         if n_x[d] < 0:
             n_x[d] = extrema(x, grid, work, work.roots[3 + d])
         n_low, n_high = n_x[d], 0

@@ -1,4 +1,4 @@
-"""Contact surfaces: nodes, facets, and how the nodes move with the coordinates of a structure."""
+"""Contact surfaces: nodes, facets, and the operator from coordinates to displacements of the nodes."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
 
-SMOOTH = np.cos(np.radians(30.0))  # facets that turn further from the mean normal of a node meet at an edge
+SMOOTH = np.cos(np.radians(30.0))  # facets at a larger angle to the mean normal of a node meet at an edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,10 @@ class Surface:
         return self.weighted(np.maximum(facets, 0), interpolation(facets, reference))
 
     def weighted(self, nodes: IntArray, weights: FloatArray) -> Matrix:
-        """Return the (3 p, n_dofs) operator to means of node displacements: `nodes`, `weights` of shape (p, k)."""
+        """Return the (3 p, n_dofs) operator to weighted means of node displacements.
+
+        `nodes` and `weights` have shape (p, k).
+        """
         p, k = nodes.shape
         rows = np.repeat(np.arange(p), k)
         shape = (p, len(self.points))
@@ -150,7 +153,7 @@ class Surface:
 
 
 def nodal_surface(points: FloatArray, dofs: IntArray, n: int, facets: IntArray) -> Surface:
-    """Return the surface whose nodes move with dofs of their own.
+    """Return the surface whose nodes have their own dofs.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
-"""Trigonometric polynomials in real form: values, all sign changes to round-off, and integrals of products in closed form.
+"""Trigonometric polynomials in real form: values, sign changes to round-off, and integrals of products.
 
-A polynomial of order H is its (2H+1,) coefficients of 1, cos τ, sin τ, ..., cos Hτ, sin Hτ. Its sign changes are found by exclusion: a
-cell of the period is cut in two until bounds on the second and third derivative prove that it holds none or, the polynomial being
-monotone there, exactly one, so that none is missed (as Petrov & Ewins 2003 bracket the times of transition by extrema).
+A polynomial of order H is given by its (2H+1,) coefficients of 1, cos τ, sin τ, ..., cos Hτ, sin Hτ. Sign changes are
+found by exclusion. A cell of the period is bisected until bounds on the second and third derivative prove that it
+contains no sign change or, if the polynomial is monotone in it, exactly one. Thus none is missed (Petrov & Ewins 2003
+bracket the times of transition by extrema in the same way).
 """
 
 import numpy as np
@@ -10,19 +11,20 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.cache import njit
 
-CELLS_PER_ORDER = 8  # of the grid on which the search begins; fewer leave more cells to be cut in two
-_NARROWEST = 1e-8  # width at which a cell is no longer cut: what it hides there is below round-off in the polynomial
+CELLS_PER_ORDER = 8  # of the initial grid of the search; with fewer cells, more must be bisected
+_NARROWEST = 1e-8  # width below which a cell is not bisected: hidden sign changes are below round-off of the polynomial
 _ROUND_OFF = 4e-16
-_NOISE = 4e-16  # of the polynomial's bound, for each term of its sum: smaller values have no sign of their own and count as zero
-# of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
+# relative to the polynomial's bound, per term of its sum: smaller values have no reliable sign and count as zero
+_NOISE = 4e-16
+# bisections of a cell: if a polynomial stays near zero for long, smaller parts differ only by rounding
 _MOST_CUTS = 2000
 _MOST_STEPS = 60
-DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
+DEEPEST = 40  # waiting parts of a cell: each bisection adds one, and 30 bisections reduce 2π to 1e-8
 
 
 @njit(cache=True)
 def most_sign_changes(order):  # type: ignore[no-untyped-def]
-    """Return the size of the array of sign changes: 2H exact ones, and what round-off makes of double roots."""
+    """Return the size of the array of sign changes: 2H exact ones, and spurious ones of double roots by round-off."""
     return 8 * order + 16
 
 
@@ -120,7 +122,7 @@ def root_between(polynomial, level, left, f_left, right, f_right, guess, size, s
 
 @njit(cache=True)
 def _guess(left, f_left, d_left, right, f_right, d_right):  # type: ignore[no-untyped-def]
-    """Root of the cubic τ(f) through both ends of a cell in which f is monotone."""
+    """Return the root of the cubic τ(f) through both ends of a cell in which f is monotone."""
     width = right - left
     u = -f_left / (f_right - f_left)
     a = (f_right - f_left) / d_left
@@ -201,7 +203,7 @@ def on_grid(polynomial, grid, values):  # type: ignore[no-untyped-def]
 def _search(  # type: ignore[no-untyped-def]
     polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
 ):
-    """Append the sign changes of one cell, cutting it in two until each part holds at most one for certain."""
+    """Append the sign changes of one cell, bisecting it until each part provably contains at most one."""
     waiting, cuts = 0, 0
     noise = _NOISE * size * polynomial.size
     while True:
@@ -216,14 +218,14 @@ def _search(  # type: ignore[no-untyped-def]
             f, d = value_and_slope(polynomial, middle)
             if abs(f) <= noise:
                 f = 0.0
-            # where it stays within rounding of zero there is nothing to be found
+            # within rounding of zero there is no sign change to find
             if not (f_left == 0.0 and f == 0.0 and f_right == 0.0):
                 cells[waiting, 0], cells[waiting, 1], cells[waiting, 2] = right, f_right, d_right
                 waiting += 1
                 right, f_right, d_right = middle, f, d
                 continue
         if changes and count == roots.size:
-            # more than the polynomial has: the last two stand where it is as flat as rounding, and cancel
+            # more than the polynomial can have: the last two are due to rounding where it is flat, and cancel
             count -= 1
         elif changes:
             roots[count] = root_between(

@@ -1,4 +1,4 @@
-"""Contact laws, one in each file, and their list."""
+"""Contact laws, one per file, and their registry."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -21,7 +21,7 @@ class _Registry(Mapping[str, type]):
         return len(self._classes)
 
 
-# file → class: the laws that give a force for a gap
+# file → class of laws whose force is a function of the gap
 _OF_THE_GAP = {
     "bonded": "Bonded",
     "unilateral_spring": "UnilateralSpring",
@@ -36,7 +36,7 @@ _OF_THE_GAP = {
     "iwan": "Iwan",
 }
 LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP)
-# what a study file may name: also the law whose force is no function of the gap, see `harmonic.dlft`
+# all laws of study files, including the rigid one, whose force is not a function of the gap (`harmonic.dlft`)
 ALL_LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP | {"rigid_coulomb": "RigidCoulomb"})
 
 

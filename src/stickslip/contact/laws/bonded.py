@@ -48,7 +48,7 @@ class Bonded:
         return element(k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=np.inf, unilateral=False)
 
     def elements(self) -> FloatArray:
-        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        """Return the (1, 7) rows of elementary contacts whose sum is the law."""
         return self.parameters()[None]
 
     def initial_state(self) -> FloatArray:

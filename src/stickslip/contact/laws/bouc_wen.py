@@ -21,18 +21,18 @@ from stickslip.units import check_quantities, quantity
 class BoucWen:
     """Smooth hysteresis ``T = alpha k x + (1 - alpha) k z``, ``dz = (a - (beta sign(z dx) + gamma) |z|ⁿ) dx`` (Wen 1976).
 
-    Independent of the rate, and integrated exactly over each increment. Acts along t and w, each for itself and with the same shape;
-    along n stands a linear spring that also pulls. The largest z is ``(a / (beta + gamma))^(1/n)``. A tangent is said to
-    slip where dz/dx has fallen below half of a.
+    The law is independent of the rate, and integrated exactly over each increment. It acts independently along t and w,
+    with the same shape; along n it is a linear spring in tension and compression. The largest z is
+    ``(a / (beta + gamma))^(1/n)``. A tangent counts as slipping where dz/dx is below half of a.
 
     Parameters
     ----------
     k_t
         Stiffness along t, N/m; times ``alpha + (1 - alpha) a`` at rest.
     beta, gamma
-        Shape of the loop, m⁻ⁿ; ``beta > 0`` and ``-beta < gamma <= beta``, without which the law would give energy.
+        Shape of the loop, m⁻ⁿ; ``beta > 0`` and ``-beta < gamma <= beta``, otherwise the law would generate energy.
     alpha
-        Share of the stiffness left when z no longer grows, 0 to 1.
+        Share of the stiffness that remains when z no longer grows, 0 to 1.
     a
         dz/dx at z = 0.
     exponent
@@ -86,7 +86,7 @@ class BoucWen:
         return np.array([self.k_t, self.k_w, *shape, self.k_n])
 
     def initial_state(self) -> FloatArray:
-        """Return the (4,) displacement and share of the largest z, of t and of w, before t = 0: all zero."""
+        """Return the (4,) displacement and share of the largest z, for t and for w, before t = 0: all zero."""
         return np.zeros(4)
 
     def stuck_stiffness(self) -> FloatArray:

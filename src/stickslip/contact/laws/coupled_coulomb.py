@@ -1,4 +1,4 @@
-"""Unilateral normal spring with a planar friction spring: the vector of the friction forces is limited."""
+"""Unilateral normal spring with a planar friction spring, whose force is limited as a vector."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -16,11 +16,11 @@ from stickslip.units import check_quantities, quantity
 class CoupledCoulomb:
     """Contact that sticks, slips in any direction of its plane and lifts off.
 
-    ``N = max(0, preload - k_n g_n)`` as in `ElasticCoulomb`, but one spring in the plane, whose force is limited as a vector:
-    ``T_t² + T_w² <= (mu N)²``. A slider that slips moves along the force. With one stiffness the law does not depend on the orientation of
-    t and w in the plane.
+    ``N = max(0, preload - k_n g_n)`` as in `ElasticCoulomb`, but with one spring in the plane, whose force is limited
+    as a vector: ``T_t² + T_w² <= (mu N)²``. During slip, the slider moves along the force. With one stiffness the law
+    does not depend on the orientation of t and w in the plane.
 
-    A step assumes that displacement and normal force change linearly from the previous step, and follows stick up to the
+    A step assumes that displacement and normal force change linearly from the previous step. It follows stick up to the
     limit, slip along it, opening and closing within the step.
 
     Parameters
@@ -32,11 +32,12 @@ class CoupledCoulomb:
     mu
         Friction coefficient.
     preload
-        Normal force at zero normal gap, N; negative for a contact with a clearance. With ``k_n = 0`` the normal force is constant.
+        Normal force at zero normal gap, N; negative for a contact with a clearance. With ``k_n = 0`` the normal force
+        is constant.
     k_w
         Contact stiffness along w, N/m; None: as along t.
     slider
-        Tangential gaps (t, w) at which the spring is unstretched before t = 0, m, as found by
+        Tangential gaps (t, w) at which the spring is unstretched before t = 0, m, as returned by
         `stickslip.response.frozen_sliders`; None: zero.
 
     Raises
@@ -81,19 +82,25 @@ class CoupledCoulomb:
         return np.array([self.k_t, self._along_w, self.k_n, self.mu, self.preload])
 
     def normal_contact(self) -> ElasticCoulomb | None:
-        """Return the normal contact without friction; None where the normal force is constant."""
+        """Return the normal contact without friction; None if the normal force is constant."""
         if self.k_n <= 0.0:
             return None
         return ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=self.k_n, mu=0.0, preload=self.preload)
 
     def planar(self) -> FloatArray | None:
-        """Return the (4,) k_t, k_n, mu and preload of an isotropic contact, see `contact.law.PlanarFriction`; None with two stiffnesses."""
+        """Return the (4,) k_t, k_n, mu and preload of an isotropic contact; None with two stiffnesses.
+
+        See `contact.law.PlanarFriction`.
+        """
         if self._along_w != self.k_t:
             return None
         return np.array([self.k_t, self.k_n, self.mu, self.preload])
 
     def initial_state(self) -> FloatArray:
-        """Return the (5,) position of the slider, displacement (m) and normal force (N) before t = 0: the spring is unstretched there, and t = 0 is reached while N grows from nothing."""
+        """Return the (5,) slider position, displacement (m) and normal force (N) before t = 0.
+
+        The spring is unstretched there, and the normal force grows from zero until t = 0.
+        """
         at = (0.0, 0.0) if self.slider is None else self.slider
         return np.array([*at, *at, 0.0])
 

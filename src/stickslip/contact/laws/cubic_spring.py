@@ -1,4 +1,4 @@
-"""Linear and cubic spring, as of the Duffing oscillator."""
+"""Spring with linear and cubic stiffness, as in the Duffing oscillator."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -24,7 +24,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
         k, x, before, held = parameters[d], displacement[d], state[2 * d], state[2 * d + 1]
         move = x - before
         toward = limit * np.sign(move)
-        left = np.exp(-k * abs(move) / limit)  # of the distance to the limit
+        left = np.exp(-k * abs(move) / limit)  # share of the distance to the limit that remains
         force[d] = held - (toward - held) * np.expm1(-k * abs(move) / limit)
         slope = k * left * (1.0 - held * np.sign(move) / limit)
         new_state[2 * d] = x
@@ -43,16 +43,17 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
 class Dahl:
     """Friction whose stiffness falls as its force nears the limit: ``dT/dx = k (1 - sign(dx) T / limit)`` (Dahl 1968, exponent 1).
 
-    Independent of the rate. Acts along t and w, each for itself and with the same limit; along n stands a linear spring that also
-    pulls. A tangent is said to slip where its stiffness has fallen below half of its first value. A force whose mean is not
-    zero relaxes over many cycles, however small they are: the mean of the periodic force is zero.
+    The law is independent of the rate. It acts independently along t and w, with the same limit; along n it is a linear
+    spring in tension and compression. A tangent counts as slipping where its stiffness is below half of its initial
+    value. A nonzero mean force relaxes over many cycles, however small they are, so that the mean of the periodic force
+    is zero.
 
     Parameters
     ----------
     k_t
         Stiffness along t at zero force, N/m.
     limit
-        Friction force that is approached, N.
+        Limit that the friction force approaches, N.
     k_w
         Stiffness along w at zero force, N/m.
     k_n
@@ -81,7 +82,7 @@ class Dahl:
         return np.array([self.k_t, self.k_w, self.limit, self.k_n])
 
     def initial_state(self) -> FloatArray:
-        """Return the (4,) displacement and force of t and of w before t = 0: no force at zero displacement."""
+        """Return the (4,) displacement and force along t and along w before t = 0: no force at zero displacement."""
         return np.zeros(4)
 
     def stuck_stiffness(self) -> FloatArray:

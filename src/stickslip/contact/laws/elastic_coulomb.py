@@ -23,8 +23,8 @@ from stickslip.units import check_quantities, quantity
 class ElasticCoulomb:
     """Node-to-node contact that sticks, slips and lifts off (Gastaldi & Berruti 2017, section 5.1).
 
-    ``N = max(0, preload - k_n g_n)``; each tangential spring is limited to ``mu N`` and is free while the contact is open.
-    A constant limit is ``k_n = 0`` with a preload, an initial gap is ``preload = -k_n gap``.
+    ``N = max(0, preload - k_n g_n)``; each tangential spring is limited to ``mu N`` and is free while the contact is
+    open. For a constant limit, set ``k_n = 0`` and a preload; for an initial gap, set ``preload = -k_n gap``.
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ class ElasticCoulomb:
         Normal force at zero normal gap, N; negative for a contact with a clearance.
     residual_traction
         None: each tangential spring is unstretched at zero displacement, or at `slider`. A number m in [-1, 1]: the
-        tangential force just before t = 0 is ``m mu N`` (Ferhatoglu & Zucca's start value), which chooses one of the
+        tangential force just before t = 0 is ``m mu N`` (the start value of Ferhatoglu & Zucca). It selects one of the
         admissible mean forces of a contact that does not slip.
     slider
-        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m, as found by
+        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m, as returned by
         `stickslip.response.frozen_sliders`; None: zero. Not together with a residual traction.
 
     Raises
@@ -88,7 +88,7 @@ class ElasticCoulomb:
         )
 
     def elements(self) -> FloatArray:
-        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        """Return the (1, 7) rows of elementary contacts whose sum is the law."""
         return self.parameters()[None]
 
     def unstretched(self) -> "ElasticCoulomb":

@@ -1,7 +1,8 @@
 """Iwan's parallel-series element: many Jenkins elements in parallel, with published populations of sliders.
 
-A slider of break-free distance φ has a stiffness density ρ(φ) (Segalman 2005, eq. 5). A cell of the density becomes one slider with the
-stiffness ``∫ρ dφ`` and the limit ``∫ρ φ dφ`` of that cell, so that stiffness and limit of the whole are exact whatever the number.
+The stiffness density of sliders with break-free distance φ is ρ(φ) (Segalman 2005, eq. 5). Each cell of the density
+becomes one slider with the stiffness ``∫ρ dφ`` and the limit ``∫ρ φ dφ`` of the cell, so that total stiffness and limit
+are exact for any number of sliders.
 """
 
 from dataclasses import dataclass, field
@@ -27,13 +28,18 @@ class Population(Protocol):
     """Protocol of a population of sliders."""
 
     def sliders(self) -> FloatArray:
-        """Return (2, n) shares of the stiffness, with sum 1, and of the limit, the finite ones with sum 1."""
+        """Return (2, n) shares of the stiffness, with sum 1, and of the limit.
+
+        Finite shares of the limit have sum 1.
+        """
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UniformBand:
-    """Break-free distances spread evenly over a band about their mean (Iwan 1966), beside an elastic spring (Song et al. 2004).
+    """Break-free distances spread evenly over a band about their mean (Iwan 1966).
+
+    An elastic spring may act in parallel (Song et al. 2004).
 
     Parameters
     ----------
@@ -42,7 +48,7 @@ class UniformBand:
     half_width
         Half-width of the band over the mean distance, above 0 and at most 1; 1: the band begins at zero.
     elastic_share
-        Share of the stiffness that never slips, from 0 to below 1; the limit is that of the sliders.
+        Share of the stiffness that never slips, from 0 to below 1; the limit does not include this spring.
 
     Raises
     ------
@@ -110,8 +116,8 @@ class FourParameter:
 class FirstLoading:
     """Sliders that reproduce a first-loading curve: they slip one after the other at its corners (Segalman & Starr 2008).
 
-    The curve begins at the origin; at its end all sliders slip, and the force stays constant. Only its shape counts: the element scales
-    it to its own stiffness and limit.
+    The curve begins at the origin; at its end all sliders slip, and the force stays constant. Only its shape matters,
+    because the element scales it to its own stiffness and limit.
 
     Parameters
     ----------
@@ -146,7 +152,7 @@ class FirstLoading:
             )
 
     def _slopes(self) -> FloatArray:
-        """Slopes of the curve between its corners."""
+        """Return the slopes of the curve between its corners."""
         force, displacement = np.array([0.0, *self.force]), np.array([0.0, *self.displacement])
         return np.asarray(np.diff(force) / np.diff(displacement))
 
@@ -159,7 +165,7 @@ class FirstLoading:
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
-    """Advance all sliders of t, then of w, whose positions are the state."""
+    """Advance all sliders along t, then along w; their positions are the state."""
     n = state.size // 2
     for d in range(2):
         x, slipping = displacement[d], 0
@@ -171,7 +177,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
                 jac[3 + row, d] = 1.0
                 continue
             trial = k * (x - state[row])
-            # x - s of a slider that rests at its limit is off by rounding
+            # x - s of a slider at rest on its limit is off by rounding
             if abs(trial) <= limit + ROUND_OFF * k * (abs(x) + abs(state[row])):
                 new_state[row] = state[row]
                 force[d] += trial
@@ -193,8 +199,8 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
 class Iwan:
     """Jenkins elements in parallel that slip one after the other: micro-slip (Iwan 1966).
 
-    Acts along t and w, each for itself and with the same limits; along n stands a linear spring that also pulls. A tangent
-    is said to slip where at least one slider does.
+    The law acts independently along t and w, with the same limits; along n it is a linear spring in tension and
+    compression. A tangent counts as slipping if at least one slider slips.
 
     Parameters
     ----------
@@ -207,7 +213,7 @@ class Iwan:
     k_n
         Stiffness of the linear normal spring, N/m.
     population
-        How stiffness and limit are shared among the sliders: `UniformBand`, `FourParameter` or `FirstLoading`.
+        Distribution of stiffness and limit among the sliders: `UniformBand`, `FourParameter` or `FirstLoading`.
 
     Raises
     ------
@@ -229,7 +235,7 @@ class Iwan:
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def _limits(self) -> FloatArray:
-        """Return the (n,) limits of the sliders; those of elastic springs are infinite."""
+        """Return the (n,) limits of the sliders; elastic springs have an infinite limit."""
         shares = self.population.sliders()[1]
         return np.array([share if np.isinf(share) else share * self.limit for share in shares])
 
@@ -239,7 +245,7 @@ class Iwan:
         return np.concatenate([self.k_t * shares, self.k_w * shares, self._limits(), [self.k_n]])
 
     def elements(self) -> FloatArray:
-        """Return the (n, 7) rows of elementary contacts that the law is the sum of."""
+        """Return the (n, 7) rows of elementary contacts whose sum is the law."""
         shares = self.population.sliders()[0]
         rows = [
             element(

@@ -22,7 +22,8 @@ from stickslip.units import check_quantities
 class Jenkins:
     """Elastic, perfectly plastic friction: ``dT = k dg`` while ``|T| <= limit`` (Griffin 1980).
 
-    Acts along t and w, each for itself and with the same limit; along n stands a linear spring that also pulls.
+    The law acts independently along t and w, with the same limit; along n it is a linear spring in tension and
+    compression.
 
     Parameters
     ----------
@@ -57,11 +58,11 @@ class Jenkins:
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def parameters(self) -> FloatArray:
-        """Return the (7,) row of an elementary contact of constant limit."""
+        """Return the (7,) row of an elementary contact with constant limit."""
         return element(k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=self.limit, unilateral=False)
 
     def elements(self) -> FloatArray:
-        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        """Return the (1, 7) rows of elementary contacts whose sum is the law."""
         return self.parameters()[None]
 
     def initial_state(self) -> FloatArray:

@@ -33,7 +33,7 @@ polynomial_step = law_kernel(_step)
 class PolynomialSpring:
     """Elastic spring ``force = c_1 g + c_2 g² + c_3 g³ + …`` along each direction, without memory and without friction.
 
-    The force along n counts like the others: it acts against a growing gap. Even powers are allowed.
+    The normal force has the same sign convention: it acts against a growing gap. Even powers are allowed.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class PolynomialSpring:
             )
 
     def parameters(self) -> FloatArray:
-        """Return the (3 degree,) coefficients of t, w and n, each padded with zeros to the highest degree."""
+        """Return the (3 degree,) coefficients along t, w and n, each padded with zeros to the highest degree."""
         directions = (self.along_t, self.along_w, self.along_n)
         degree = max(len(c) for c in directions)
         out = np.zeros((3, degree))
@@ -90,7 +90,10 @@ class PolynomialSpring:
         return np.array([c[0] if c else 0.0 for c in (self.along_t, self.along_w, self.along_n)])
 
     def restores(self) -> BoolArray:
-        """Return the (3,) directions t, w, n along which the force opposes every large displacement: the last power is odd, its coefficient positive."""
+        """Return the (3,) directions t, w, n along which the force opposes every large displacement.
+
+        There the highest power is odd, and its coefficient positive.
+        """
         last = [np.flatnonzero(c) for c in (self.along_t, self.along_w, self.along_n)]
         each = zip(last, (self.along_t, self.along_w, self.along_n), strict=True)
         return np.array([bool(k.size and k[-1] % 2 == 0 and c[k[-1]] > 0.0) for k, c in each])

@@ -1,4 +1,4 @@
-"""Fields that several laws share, with their study keys, and checks of their values."""
+"""Dataclass fields that several laws share, with their study keys, and checks of their values."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from stickslip.units import quantity
 
 
 def tangential_stiffness(**given: Any) -> Any:
-    """Return the field of the stiffness along t; ``default=`` makes it optional, as in the functions below."""
+    """Return the field of the stiffness along t; as in the functions below, ``default=`` makes it optional."""
     return _stiffness("tangent t", "tangential_stiffness", given)
 
 

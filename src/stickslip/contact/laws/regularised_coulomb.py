@@ -12,7 +12,7 @@ from stickslip.units import check_quantities, quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
-    """Friction along the velocity of each tangent; there is no state."""
+    """Evaluate friction along the velocity of each tangent; there is no state."""
     k_n, mu, preload, transition = parameters
     pressure = preload - k_n * displacement[2]
     if pressure < 0.0:
@@ -33,15 +33,16 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
 class RegularisedCoulomb:
     """Coulomb friction without sticking: ``T = mu N tanh(v / transition_velocity)``, ``N = max(0, preload - k_n g_n)``.
 
-    Acts along t and w, each for itself; there is no tangential stiffness, and a constant force makes the contact creep. A
-    tangent is said to stick below the transition velocity.
+    The law acts independently along t and w. There is no tangential stiffness, and the contact creeps under a constant
+    force. A tangent counts as sticking below the transition velocity.
 
     Parameters
     ----------
     mu
         Friction coefficient.
     transition_velocity
-        Velocity at which the friction force is 76 % of its limit, m/s; to be small against the velocities of the vibration.
+        Velocity at which the friction force is 76 % of its limit, m/s; small compared with the velocities of the
+        vibration.
     k_n
         Normal contact stiffness, N/m; zero for a constant normal force.
     preload
@@ -75,5 +76,5 @@ class RegularisedCoulomb:
         return np.zeros(0)
 
     def stuck_stiffness(self) -> FloatArray:
-        """Return the (3,) stiffnesses t, w, n of the closed contact, N/m; the friction has none."""
+        """Return the (3,) stiffnesses t, w, n of the closed contact, N/m; friction has no stiffness."""
         return np.array([0.0, 0.0, self.k_n])

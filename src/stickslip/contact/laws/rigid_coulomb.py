@@ -1,10 +1,10 @@
-"""Coulomb friction on a rigid unilateral contact, without stiffness: the law, and its forces over one period by projection.
+"""Coulomb friction on a rigid unilateral contact: the law, and its forces over one period by projection.
 
-The prediction ``p`` is the force that would keep the contact as it is: the force that equilibrium asks for, plus a penalty times the
-forbidden motion, sliding along the tangents and penetration along the normal. Coulomb's and Signorini's laws are then projections,
-``N = max(0, -p_n)`` and ``T = min(max(p_t, -mu N), mu N)``, without memory. A projection multiplies by 0 or 1 at
-each sample, so that a derivative block is a matrix of products of the Fourier basis with a weight: Toeplitz and Hankel parts of its
-spectrum.
+The predicted force ``p`` would keep the contact as it is: it is the force that equilibrium requires, plus a penalty
+times the forbidden motion, sliding along the tangents and penetration along the normal. Coulomb's and Signorini's laws
+are then projections without memory, ``N = max(0, -p_n)`` and ``T = min(max(p_t, -mu N), mu N)``. A projection
+multiplies each sample by 0 or 1, so that a derivative block contains products of the Fourier basis with a weight:
+Toeplitz and Hankel parts of the weight's spectrum.
 """
 
 from dataclasses import dataclass
@@ -24,19 +24,21 @@ from stickslip.units import check_quantities
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigidCoulomb:
-    """Set-valued Coulomb friction and Signorini's condition (Nacivet et al. 2003): the limit of `ElasticCoulomb` as it stiffens.
+    """Set-valued Coulomb friction and Signorini's condition (Nacivet et al. 2003).
 
-    Each tangent sticks without moving while its force stays below ``mu N``, and slips against ``mu N`` otherwise. The force is no
-    function of the gap: harmonic balance cannot evaluate it, and `dynamic_lagrangian` solves for it.
+    The law is the limit of `ElasticCoulomb` for infinite stiffness. Each tangent sticks without moving while its force
+    stays below ``mu N``, and slips against ``mu N`` otherwise. The force is not a function of the gap: harmonic balance
+    cannot evaluate it, and `dynamic_lagrangian` solves for it.
 
     Parameters
     ----------
     mu
         Friction coefficient, the same for both tangents, which are independent.
     preload
-        None: the normal direction is rigid and unilateral, ``g + initial_gap >= 0``, ``N >= 0``, one of them zero, and N follows from
-        equilibrium. A preload then comes with the static load, or as interference. A number: a constant normal load N_0 in N presses
-        the contact at all times, the limit is ``mu N_0``, and the normal direction is free.
+        None: the normal direction is rigid and unilateral, ``g + initial_gap >= 0``, ``N >= 0``, one of them zero, and
+        N follows from equilibrium. A preload is then part of the static load, or an interference. A number: a constant
+        normal load N_0 in N presses the contact at all times, the limit is ``mu N_0``, and the normal direction is
+        free.
     initial_gap
         Normal gap at zero displacement, m; negative for an interference.
 
@@ -64,7 +66,7 @@ class RigidCoulomb:
             )
 
     def softened(self, stiffness: float) -> ElasticCoulomb | Jenkins:
-        """Return the penalty law that tends to this one as `stiffness` (N/m) grows."""
+        """Return the penalty law that tends to this law as `stiffness` (N/m) grows."""
         if self.preload is not None:
             return Jenkins(k_t=stiffness, k_w=stiffness, limit=self.mu * self.preload)
         return ElasticCoulomb(
@@ -76,11 +78,11 @@ class RigidCoulomb:
         )
 
     def parameters(self) -> NoReturn:
-        """Refuse: there is no force to compute from a gap."""
+        """Refuse: the force does not follow from a gap."""
         raise self._refusal()
 
     def initial_state(self) -> NoReturn:
-        """Refuse: there is no force to compute from a gap."""
+        """Refuse: the force does not follow from a gap."""
         raise self._refusal()
 
     def stuck_stiffness(self) -> FloatArray:
@@ -95,7 +97,7 @@ class RigidCoulomb:
         )
 
 
-ROUNDING = 1e-9  # share of the limit by which a force that only touches it may exceed it
+ROUNDING = 1e-9  # relative excess over the limit below which a force counts as not slipping
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +111,8 @@ class RigidPeriod:
     state
         (n_contacts, 2, samples): 0 stick, 1 slip, 2 open.
     blocks
-        (n_contacts, 5, m, m) derivatives of the coefficients of the forces by those of the predictions; order TT, WW, NN, TN, WN.
+        (n_contacts, 5, m, m) derivatives of the force coefficients by the coefficients of the predictions; order TT,
+        WW, NN, TN, WN.
     stuck
         (n_contacts, 2) tangents that stick throughout the period.
     """
@@ -121,7 +124,7 @@ class RigidPeriod:
 
 
 def project(predicted: FloatArray, mu: FloatArray, constant: FloatArray, order: int) -> RigidPeriod:
-    """Project predicted forces on the forces that Coulomb's and Signorini's laws allow.
+    """Project predicted forces onto the forces allowed by Coulomb's and Signorini's laws.
 
     Parameters
     ----------
@@ -157,7 +160,7 @@ def project(predicted: FloatArray, mu: FloatArray, constant: FloatArray, order: 
 
 
 def weighted_products(weight: FloatArray, order: int) -> FloatArray:
-    """Return the (n, m, m) matrices from the Fourier coefficients of a signal to the coefficients of `weight` (n, samples) times the signal."""
+    """Return the (n, m, m) matrices that multiply a signal by `weight` (n, samples), in Fourier coefficients."""
     samples = weight.shape[1]
     spectrum = np.fft.fft(weight, axis=1)[:, np.arange(2 * order + 1) % samples] / samples
     cos, sin = spectrum.real, -spectrum.imag

@@ -15,7 +15,7 @@ from stickslip.units import check_quantities
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnilateralSpring:
-    """Penalty spring along the normal, ``N = max(0, preload - k_n (g_n + initial_gap))``; nothing along t and w.
+    """Penalty spring along the normal, ``N = max(0, preload - k_n (g_n + initial_gap))``; no force along t and w.
 
     Parameters
     ----------
@@ -50,7 +50,10 @@ class UnilateralSpring:
             )
 
     def at_rest(self, preload: float, gap: float) -> "UnilateralSpring":
-        """Return the law with a further normal force (N) and clearance (m): as a preload where it is pressed, else as a clearance."""
+        """Return the law with a further normal force (N) and clearance (m).
+
+        Their sum is a preload if the contact is pressed, else a clearance.
+        """
         preload, gap = self.preload + preload, self.initial_gap + gap
         clearance = gap - preload / self.k_n
         if clearance > 0.0:
@@ -62,7 +65,7 @@ class UnilateralSpring:
         return element(k_n=self.k_n, preload=self.preload - self.k_n * self.initial_gap)
 
     def elements(self) -> FloatArray:
-        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        """Return the (1, 7) rows of elementary contacts whose sum is the law."""
         return self.parameters()[None]
 
     def initial_state(self) -> FloatArray:

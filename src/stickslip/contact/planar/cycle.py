@@ -1,8 +1,9 @@
-"""The course of a planar contact over a period that repeats.
+"""The periodic steady state of a planar contact.
 
-A contact that opens forgets: it is followed from each closing to the next opening, once. One that stays closed keeps the memory of its
-start in its slip; its periods are followed from a slider at zero displacement, with steps of Newton's method towards the state that
-repeats. A direction that forgets nothing is left where the first periods dragged it.
+A contact that opens forgets its history, and is followed once from each closing to the next opening. A contact that
+stays closed keeps the memory of its start while it slips. Its periods are followed from a slider at zero displacement,
+with Newton steps towards the periodic state. Directions that never forget their start stay where the first periods
+dragged them.
 """
 
 import numpy as np
@@ -26,13 +27,13 @@ from stickslip.contact.planar.trajectory import (
 from stickslip.contact.slider import PERIOD
 
 MAX_PERIODS = 400
-_ROUNDING = 1e-13  # change over a period that counts as none, as a share of the smaller of limit and motion
-_ROUND_OFF = 1e-15  # of the displacement
-# distance from the periodic state that the derivatives by the start bridge, in the same measure
+_ROUNDING = 1e-13  # change over a period that counts as zero, as a share of the smaller of limit and motion
+_ROUND_OFF = 1e-15  # relative to the displacement
+# distance from the periodic state that is corrected by the derivatives by the start, in the same measure
 _START_DIFFERENCE = 1e-7
-_NOTHING = 1e-13  # share of the largest limit at which a contact counts as just closing
-_LEAST_SHARE = 0.1  # of a step of Newton's method that is tried
-_KEPT = 1e-9  # singular value below which a direction keeps its memory for ever
+_NOTHING = 1e-13  # share of the largest limit below which a contact counts as just closing
+_LEAST_SHARE = 0.1  # smallest share of a Newton step that is tried
+_KEPT = 1e-9  # singular value below which a direction never forgets its start
 
 
 @njit(**INNER)
@@ -49,7 +50,7 @@ def follow_closings(run, course, roots, n_roots, starts_open):  # type: ignore[n
 
 @njit(**INNER)
 def _place_of(course, x, y, limit):  # type: ignore[no-untyped-def]
-    """Return the slider's place at the end or the start of a period, where the motion is x, y, limit."""
+    """Return the slider's position at the end or the start of a period, where the motion is x, y, limit."""
     state = course.state
     if state[MODE] == SLIP:
         return x - limit * np.cos(state[ANGLE]), y - limit * np.sin(state[ANGLE])
@@ -58,7 +59,10 @@ def _place_of(course, x, y, limit):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def one_period(run, course, x, y, limit):  # type: ignore[no-untyped-def]
-    """Follow one period from the present state; its memory is the derivative of the slider's place at the end by that at the start."""
+    """Follow one period from the present state.
+
+    Fill `memory`, the derivative of the slider's final position by its initial one.
+    """
     course.counts[:3] = 0
     memory, state = course.memory, course.state
     course.begun[:] = state
@@ -110,7 +114,10 @@ def _step(course, x, y, limit, dx, dy):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _follow(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
-    """Follow one period from the state that is there, with `carries` the rows of the place, too; return how far the place moves."""
+    """Follow one period from the present state; return how far the slider's position moves.
+
+    With `carries`, the derivatives of the position are followed, too.
+    """
     before_x, before_y = _place_of(course, x, y, limit)
     one_period(run, course, x, y, limit)
     if carries:
@@ -121,7 +128,7 @@ def _follow(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # 
 
 @njit(**PART)
 def _measures(motion):  # type: ignore[no-untyped-def]
-    """Return the smaller of motion and limit, by which distances are measured, and the change over a period that counts as none."""
+    """Return the smaller of motion and limit, a measure of distances, and the change that counts as zero."""
     size = np.hypot(motion.waves[X, 0], motion.waves[Y, 0]) + motion.bounds[0]
     small = min(size, motion.bounds[4])
     return small, _ROUNDING * small + _ROUND_OFF * size
@@ -129,7 +136,7 @@ def _measures(motion):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _newton(memory, dx, dy):  # type: ignore[no-untyped-def]
-    """Return the pseudo-inverse of ``1 - M`` and the step from the place at the start of a period to that which repeats."""
+    """Return the pseudo-inverse of ``1 - M`` and the step from the initial position to the periodic one."""
     inverse, _ = forgets(memory)
     return inverse, inverse[0, 0] * dx + inverse[0, 1] * dy, inverse[1, 0] * dx + inverse[1, 1] * dy
 
@@ -146,7 +153,7 @@ def _slips(course):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
-    """Fill the difference of the rows at the end of a period from those at the start of the next Newton iteration."""
+    """Fill the difference between the rows at the end of a period and at the start of the next Newton iteration."""
     for p in range(before.shape[1]):
         dx, dy = after[0, p] - before[0, p], after[1, p] - before[1, p]
         leap[0, p] = inverse[0, 0] * dx + inverse[0, 1] * dy - dx
@@ -155,7 +162,7 @@ def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows):  # type: ignore[no-untyped-def]
-    """Continue from the safe state plus a share of the last step from it."""
+    """Set the safe state plus a share of the last step from it."""
     course.state[:] = safe
     _step(course, x, y, limit, share * leap[0], share * leap[1])
     for s in range(2):
@@ -165,7 +172,7 @@ def _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows):  
 
 @njit(**PART)
 def _touch(run, course, correction):  # type: ignore[no-untyped-def]
-    """Follow the one period of a contact whose normal force touches zero where it begins: nothing is remembered."""
+    """Follow one period of a contact whose normal force touches zero at its start: it has no memory."""
     course.counts[:] = 0
     correction[:] = 0.0
     begin_closed(course, 0.0)
@@ -175,7 +182,10 @@ def _touch(run, course, correction):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _lead(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
-    """Follow the first period from zero displacement, roughly where its end only leads near a state that forgets it."""
+    """Follow the first period from zero displacement.
+
+    Without `carries`, a rough course suffices, because its end is only a first guess.
+    """
     begin_at(course, 0.0, 0.0, 0.0)
     course.counts[3] = 0 if carries else 1
     _follow(run, course, x, y, limit, follow_rows, k, slope, rows, carries)
@@ -184,26 +194,27 @@ def _lead(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # ty
 
 @njit(**INNER)
 def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
-    """Follow periods until the state repeats.
+    """Follow periods until the state is periodic.
 
     Parameters
     ----------
     run
         `course.run`.
     course
-        Course with its motion filled; on return its segments are those of the last period.
+        Course with its motion filled; on return it contains the segments of the last period.
     correction
-        Out: (2,) remaining error of the slider's place at the start of this period, small enough for a correction by derivatives.
+        Out: (2,) remaining error of the slider's position at the start of this period, small enough for a correction by
+        derivatives.
     follow_rows, k, slope
         The function `sensitivities.follow_rows` and its arguments.
     rows
-        With `carries`: derivatives of the place at the start of the first period, and on return at the end of the last one. Steps of
-        Newton's method change them as they change the state.
+        With `carries`: derivatives of the position at the start of the first period, and on return at the end of the
+        last one. Newton steps change them together with the state.
 
     Returns
     -------
     int
-        Periods followed, or -1 if the state did not repeat.
+        Number of periods, or -1 if the state did not become periodic.
     """
     motion, state, memory = course.motion, course.state, course.memory
     x, y, limit = place(motion, 0.0)
@@ -223,7 +234,8 @@ def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # ty
         if course.counts[2] != 0:
             return -1
         moved = max(abs(dx), abs(dy))
-        # a step of Newton's method after which the contact slips less often has left out where the slider would have come to rest
+        # after a Newton step, fewer slips than before: the step passed the point where the slider would have come to
+        # rest
         found = _slips(course)
         beyond, jumped = jumped and found < slips, False
         if beyond and share > _LEAST_SHARE:
@@ -240,12 +252,12 @@ def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # ty
             return period
         leads = np.isfinite(distance) and not beyond
         if leads and moved > 0.5 * last and leaps > 0 and plain == 0:
-            # where the start is hardly forgotten, the first step goes too far, and the next ones come back by halves
+            # if the start is hardly forgotten, the first step goes too far, and the next ones halve the error
             leaps, last = leaps - 1, np.inf
         if plain > 0:
             plain -= 1
         elif moved > 0.5 * last or not leads:
-            # the last step led nowhere: go on from where it was made
+            # the last step made it worse: continue from the state before it
             state[:] = safe
             rows.place[:] = safe_rows
             last, plain, patience, leaps = np.inf, patience, 2 * patience, 1
@@ -253,7 +265,7 @@ def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # ty
             last, jumped, share = moved, True, 1.0
             safe[:] = state
             safe_rows[:] = rows.place
-            # the state at the end has moved by d already
+            # the state at the end of the period already contains the change d
             leap[0], leap[1] = step_x - dx, step_y - dy
             _rows_of_step(inverse, rows_before, rows.place, rows_leap)
             _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows)

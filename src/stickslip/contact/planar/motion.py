@@ -1,4 +1,4 @@
-"""The motion under a planar contact, in units of force: ``X = k x`` in the plane and the limit ``L = μ N``, with their derivatives by τ."""
+"""Motion of a planar contact in units of force: ``X = k x`` and limit ``L = μ N``, with derivatives by τ."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from stickslip.contact.planar.radau import INNER, PACE, STAGES, TIMES
 
 TINY = 1e-300
 X, Y, L, X_RATE, Y_RATE, L_RATE = range(6)  # rows of waves
-# rows of what stands at the stages of a piece; SHARE is L divided by the derivative of time
+# rows of the values at the stages of a piece; SHARE is L over the derivative of time
 AT_X_RATE, AT_Y_RATE, AT_LIMIT, AT_LIMIT_RATE, SHARE, COS, SIN = range(7)
 
 
@@ -109,7 +109,7 @@ def accelerations(motion, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def fill_stages(motion, start, width, kind, at):  # type: ignore[no-untyped-def]
-    """Evaluate the motion at the stages of the piece that begins at `start`; no limit is below zero."""
+    """Evaluate the motion at the stages of the piece that begins at `start`; negative limits are set to zero."""
     waves = motion.waves
     for j in range(STAGES):
         tau = start + width * TIMES[kind, j + 1]

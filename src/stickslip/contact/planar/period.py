@@ -1,7 +1,8 @@
 """Forces and derivatives of isotropic planar Coulomb friction over one period, at located events.
 
-Stick is linear, and begins and ends at zeros of trigonometric polynomials or of the speed of slip. In slip ``T = L (cos θ, sin θ)`` with
-``L θ' = k x'·e⊥``, one smooth equation. Integrals of stick are in closed form, those of slip by the quadrature of the collocation.
+Stick is linear, and begins and ends at zeros of trigonometric polynomials or of the slip speed. In slip
+``T = L (cos θ, sin θ)`` with ``L θ' = k x'·e⊥``, one smooth equation. Integrals over stick are in closed form;
+integrals over slip use the quadrature of the collocation.
 """
 
 from functools import cache, lru_cache
@@ -58,7 +59,7 @@ FOLLOW_ROWS = types.void(_course, types.float64, types.float64, _rows, types.boo
 
 @njit(**INNER)
 def sample_plane(course, gap, k, force, state):  # type: ignore[no-untyped-def]
-    """Fill the force in the plane and the states where the contact is closed."""
+    """Fill the force in the plane and the states on samples where the contact is closed."""
     n = gap.shape[1]
     if n == 0:
         return
@@ -96,7 +97,10 @@ _BLOCKS = np.array([[TT, TW, TN], [WT, WW, WN]])
 
 @njit(**PART)
 def _dragged(run, follow_rows, course, k, slope, rows, correction, out):  # type: ignore[no-untyped-def]
-    """Follow a slider that begins at zero displacement to where it is dragged; fill `out` with the rows of that place. Return the periods."""
+    """Follow a slider that begins at zero displacement until it stops being dragged; return the number of periods.
+
+    The derivatives of its final position are written to `out`.
+    """
     motion = course.motion
     x, y, limit = place(motion, 0.0)
     limit = max(limit, 0.0)
@@ -117,8 +121,11 @@ def _dragged(run, follow_rows, course, k, slope, rows, correction, out):  # type
 
 @njit(**PART)
 def _closed_for_ever(run, follow_rows, course, k, slope, rows, correction, start_rows):  # type: ignore[no-untyped-def]
-    """Integrate a contact that never opens; fill the rows of its place at the start. Return whether its state repeats."""
-    # a literal would be compiled once more
+    """Integrate a contact that never opens; return whether its state is periodic.
+
+    The derivatives of its position at the start are written to `start_rows`.
+    """
+    # a literal False would cause a second compilation
     periods = settle(run, course, correction, follow_rows, k, slope, rows, np.bool_(False))
     begun = course.begun
     _, forgotten = forgets(course.memory)
@@ -169,7 +176,7 @@ def _assemble(motion, k, rows, correction, start_rows, work, coefficients, block
 
 @njit(**PART)
 def _contact(run, follow_rows, gaps, row, gap, grid, room, coefficients, blocks, force, state):  # type: ignore[no-untyped-def]
-    """Evaluate one contact; return whether its state repeats."""
+    """Evaluate one contact; return whether its state is periodic."""
     work, course, rows, correction, start_rows = room
     coefficients[:] = 0.0
     blocks[:] = 0.0
@@ -286,13 +293,13 @@ def _shared(  # type: ignore[no-untyped-def]
 
 @cache
 def _compiled() -> Any:
-    """Compile when a planar contact is evaluated first."""
+    """Return the compiled `_some`; compilation happens when a planar contact is first evaluated."""
     return njit(_SOME, cache=True, error_model="numpy")(_some)
 
 
 @cache
 def _threads() -> Any:
-    """Compile when there are contacts enough to be shared."""
+    """Return the compiled `_shared`; compilation happens when there are enough contacts for threads."""
     return njit(types.void(types.int64, types.int64, *_ARRAYS), cache=True, parallel=True)(_shared)
 
 
@@ -321,7 +328,8 @@ def planar_period(
     -------
     tuple
         (2H+1, 3 n) coefficients of the forces, N; (n, pairs, 2H+1, 2H+1) derivatives, N/m; (n, 3, samples) forces, N;
-        (n, 2, samples) states; number of contacts whose state does not repeat. All forces are NaN, and states open, where a gap is not finite or beyond 1e152 m.
+        (n, 2, samples) states; number of contacts whose state is not periodic. If a gap is not finite or beyond 1e152
+        m, all forces are NaN and all states open.
     """
     m, width = gap_coefficients.shape
     n = width // 3

@@ -7,9 +7,9 @@ import numpy as np
 from stickslip.arrays import FloatArray
 
 STAGES = 8
-# Of compiled functions that only compiled ones call: their arrays need no way in from Python, which takes long to compile.
+# options of functions that only compiled code calls: without wrappers for Python, which take long to compile
 INNER: Any = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-# Of those that one function alone calls: they are compiled with it, and not once before.
+# options of functions with a single caller, with which they are compiled instead of separately
 PART: Any = {**INNER, "inline": "always"}
 
 
@@ -29,7 +29,7 @@ def _legendre(at: FloatArray, degree: int) -> FloatArray:
     return np.polynomial.legendre.legvander(2.0 * at - 1.0, degree)
 
 
-NODES = np.concatenate([[0.0], _nodes(STAGES)])  # the start of a piece and its stages
+NODES = np.concatenate([[0.0], _nodes(STAGES)])  # start of a piece and its stages
 _VALUES = _legendre(NODES, STAGES)
 _TO_LEGENDRE = np.linalg.inv(_VALUES)
 _RATE = np.column_stack(
@@ -38,14 +38,15 @@ _RATE = np.column_stack(
 RATE = np.ascontiguousarray((_RATE @ _TO_LEGENDRE)[1:])  # (s, s + 1) derivative at the stages
 BEND = np.ascontiguousarray(RATE[-1] @ (_RATE @ _TO_LEGENDRE))  # second derivative at the end
 HIGHEST = np.ascontiguousarray(_TO_LEGENDRE[-1])  # coefficient of the Legendre polynomial of degree s
-FINE = 16  # points between which a polynomial of a piece is looked at
+FINE = 16  # points at which the polynomial of a piece is checked between its nodes
 TO_FINE = np.ascontiguousarray(_legendre(np.arange(1, FINE + 1) / FINE, STAGES) @ _TO_LEGENDRE)
 BARYCENTRIC = np.array([1.0 / np.prod(c - np.delete(NODES, i)) for i, c in enumerate(NODES)])
 # exact for polynomials of degree 2 s - 2
 WEIGHTS = np.linalg.solve(_legendre(NODES[1:], STAGES - 1).T, np.eye(STAGES)[0])
 
-# Times and their pace on the nodes of a piece; the second kind ends where the contact opens, near which θ is a power of the time left. It
-# ends just before: where the limit is zero θ jumps to the direction of the motion, which no polynomial follows.
+# Times and their rates at the nodes of a piece. The second kind is for pieces up to the opening of the contact, where θ
+# is a power of the remaining time. It ends just before: at zero limit θ jumps to the direction of the motion, which no
+# polynomial can follow.
 POWER = 3
 NEARLY = 0.97
 EVEN, CROWDED = 0, 1

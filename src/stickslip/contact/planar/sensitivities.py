@@ -1,8 +1,9 @@
-"""Derivatives of a planar contact along its course, by the coefficients of its gaps and by the place of its slider at the start.
+"""Derivatives of a planar contact by the coefficients of its gaps and by the slider's initial position.
 
-A row holds the derivatives of one number: by the coefficients of the gap t, of w and of n, m each, and by both places at the start. In
-stick the rows of the slider's place z are carried, in slip that of the angle θ. Forces are continuous at all events, and z is stationary
-where slip ends; only a contact that closes takes along the motion of the time at which it does.
+A row contains the derivatives of one number: by the m coefficients of each of the gaps t, w and n, and by both
+coordinates of the initial position. In stick, the rows of the slider's position z are followed, in slip the row of the
+angle θ. Forces are continuous at all events, and z is stationary where slip ends, so that the times of events
+contribute nothing, with one exception: a contact that closes keeps the motion at the time of closing, which moves.
 """
 
 from typing import NamedTuple
@@ -45,12 +46,12 @@ from stickslip.contact.planar.trajectory import (
 from stickslip.contact.slider import PERIOD
 from stickslip.contact.trigonometric import add_means, harmonics_at
 
-_STEEP = 1e-9  # least slope with which a limit passes zero, as a share of its bound
-_NODES_AT_ONCE = 16 * STAGES  # whose products are left to BLAS together
+_STEEP = 1e-9  # smallest slope of the limit at a zero that counts as a crossing, as a share of its bound
+_NODES_AT_ONCE = 16 * STAGES  # nodes whose products are evaluated in one BLAS call
 
 
 class Rows(NamedTuple):
-    """Arrays of the derivatives by q = 3 m + 2 quantities."""
+    """Arrays for the derivatives of numbers by q = 3 m + 2 quantities."""
 
     place: FloatArray  # (2, q) of the slider's place
     angle: FloatArray  # (q,) of the angle of slip
@@ -101,7 +102,7 @@ def basis_at(tau, out):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _turned_basis(c1, s1, out):  # type: ignore[no-untyped-def]
-    """Do so from cosine and sine of τ."""
+    """Fill `out` like `basis_at`, from cosine and sine of τ."""
     c, s = 1.0, 0.0
     out[0, 0], out[1, 0] = 1.0, 0.0
     for h in range(1, (out.shape[1] + 1) // 2):
@@ -138,7 +139,7 @@ def _close(motion, row, tau, k, slope, rows):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _to_slip(motion, angle, tau, k, rows):  # type: ignore[no-untyped-def]
-    """Turn the rows of the place into that of the angle, where the force reaches its limit in that direction."""
+    """Convert the rows of the position into the row of the angle, where the force reaches its limit."""
     m = motion.waves.shape[1]
     _, _, limit = place(motion, tau)
     limit = max(limit, TINY)
@@ -172,7 +173,7 @@ def to_stick(motion, angle, tau, k, slope, rows):  # type: ignore[no-untyped-def
 
 @njit(**INNER)
 def _flush(rows, count):  # type: ignore[no-untyped-def]
-    """Add the products of the nodes that wait."""
+    """Add the products of the waiting nodes."""
     if count > 0:
         np.dot(rows.weighted[:count].T, rows.force[:count], rows.products)
         rows.sums[:] += rows.products
@@ -180,7 +181,7 @@ def _flush(rows, count):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _fill_nodes(motion, piece, k, slope, count, rows):  # type: ignore[no-untyped-def]
-    """Solve for the rows of the angle at the stages of a piece and store those of the force from node `count` on."""
+    """Solve for the row of the angle at the stages of a piece; store the rows of the force from node `count` on."""
     m = motion.waves.shape[1]
     q = 3 * m + 2
     start, width, kind, angles, at = (
@@ -228,7 +229,10 @@ def _fill_nodes(motion, piece, k, slope, count, rows):  # type: ignore[no-untype
 
 @njit(**PART)
 def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def]
-    """Add that a piece ends where the contact opens, at a time that moves with the normal gap; its nodes move along."""
+    """Add the effect of the opening time at the end of a piece.
+
+    It moves with the normal gap, and the nodes move along.
+    """
     m = motion.waves.shape[1]
     q = 3 * m + 2
     start, width, angles, at = piece[PIECE_START], piece[PIECE_WIDTH], piece[PIECE_ANGLE:], rows.at
@@ -305,7 +309,10 @@ def _stuck(segment, rows):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _follow_slip(course, segment, k, slope, waiting, rows, adds):  # type: ignore[no-untyped-def]
-    """Carry the rows through the pieces of a segment in slip; return how many nodes wait for their products."""
+    """Follow the rows through the pieces of a slip segment.
+
+    Return the number of nodes whose products are not yet added.
+    """
     motion, angle = course.motion, segment[DIRECTION]
     first = int(segment[FIRST])
     for j in range(first, first + int(segment[COUNT])):
@@ -327,7 +334,7 @@ def follow_rows(course, k, slope, rows, adds):  # type: ignore[no-untyped-def]
 
     If the first segment begins the period, `rows.place` holds the rows at its start, and on return the rows at its end.
     """
-    waiting = np.int64(0)  # a literal would be compiled once more
+    waiting = np.int64(0)  # a literal 0 would cause a second compilation
     for i in range(course.counts[0]):
         segment = course.segments[i]
         if segment[ORIGIN] == CLOSED:

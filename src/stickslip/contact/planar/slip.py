@@ -1,7 +1,8 @@
-"""One piece of slip: the angle θ of the friction force by collocation of ``L θ' = X'·e⊥``, and the place where slip ends.
+"""One piece of slip: angle θ of the friction force by collocation of ``L θ' = X'·e⊥``, and the end of slip.
 
-The product with L keeps the equation regular where the contact closes or opens. The equation is stiff where L is small, and there θ
-follows the direction of the motion: Radau IIA is stiffly accurate, and its stages are the nodes of a quadrature.
+Multiplication by L keeps the equation regular where the contact closes or opens. The equation is stiff for small L,
+where θ follows the direction of the motion. Radau IIA is stiffly accurate, and its stages are also the nodes of a
+quadrature.
 """
 
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from stickslip.contact.cache import njit
 from stickslip.contact.planar.motion import AT_LIMIT_RATE, AT_X_RATE, AT_Y_RATE, SHARE, SIN, TINY
 from stickslip.contact.planar.radau import BARYCENTRIC, BEND, FINE, INNER, NODES, PART, RATE, STAGES, TIMES, TO_FINE
 
-_LAST_STEP = 1e-5  # last step of Newton's method: what is left is its square
+_LAST_STEP = 1e-5  # last step of Newton's method: the remaining error is its square
 _MOST_STEPS = 12
 
 
@@ -22,11 +23,11 @@ class Piece(NamedTuple):
 
     at: FloatArray  # (7, stages) what `fill_stages` finds
     angle: FloatArray  # (stages + 1,) θ at its start and stages
-    guess: FloatArray  # (2,) θ' and θ'' at the end of the piece before
+    guess: FloatArray  # (2,) θ' and θ'' at the end of the previous piece
     matrix: FloatArray  # (stages, stages) derivative of the equations, factorised
     pivots: IntArray
     right: FloatArray  # (stages,)
-    speed: FloatArray  # (stages + 1,) X'·e - L', positive while it slips
+    speed: FloatArray  # (stages + 1,) X'·e - L', positive during slip
 
 
 @njit(**INNER)
@@ -130,7 +131,7 @@ def linearise(at, angle, matrix, right):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def predict(width, kind, piece):  # type: ignore[no-untyped-def]
-    """Start with the parabola of the previous piece."""
+    """Predict the angles by the parabola of the previous piece."""
     slope, bend = piece.guess[0] * width, 0.5 * piece.guess[1] * width * width
     size = abs(slope) + abs(bend)
     share = 1.0 if size <= 1.0 else 1.0 / size
@@ -141,7 +142,10 @@ def predict(width, kind, piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def collocate(piece):  # type: ignore[no-untyped-def]
-    """Find θ at the stages of a piece whose motion is known, starting from the present values; return whether Newton's method converged."""
+    """Solve for θ at the stages of a piece with known motion, from the present values.
+
+    Return whether Newton's method converged.
+    """
     for _ in range(_MOST_STEPS):
         linearise(piece.at, piece.angle, piece.matrix, piece.right)
         if not factorise(piece.matrix, piece.pivots):
@@ -201,9 +205,9 @@ def slip_speed(piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def slip_ends(speed):  # type: ignore[no-untyped-def]
-    """Return the share of the piece at which slip ends, 2 if it continues.
+    """Return the share of the piece at which slip ends, or 2 if it continues.
 
-    The polynomial through the speed at the nodes is also evaluated at points between them.
+    The polynomial through the speed at the nodes is also checked at points between them.
     """
     left, f_left = 0.0, max(speed[0], TINY)
     for i in range(FINE):
@@ -219,7 +223,7 @@ def slip_ends(speed):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _zero(values, left, f_left, right, f_right):  # type: ignore[no-untyped-def]
-    """Return where the polynomial through `values` falls to zero, by the Illinois method."""
+    """Return the zero at which the polynomial through `values` becomes negative, by the Illinois method."""
     side = 0
     for _ in range(60):
         c = (left * f_right - right * f_left) / (f_right - f_left)

@@ -1,8 +1,8 @@
 """End of stick of a planar contact: the first zero of ``F = |X - z|² - L²``, bracketed so that none is missed.
 
-Value, slope and second derivative at a time and a bound M on the third derivative tell how far F stays below zero, or rises without
-turning. Steps of that length go from the beginning of stick to the first zero, which the last one brackets. Slip ends at a double zero
-of F, from which the search goes on without seeing it again.
+From value, slope and second derivative at a time and a bound M on the third derivative follows how long F stays below
+zero, or rises without turning. Steps of this length lead from the beginning of stick to the first zero, which the last
+step brackets. Slip ends at a double zero of F; after slip, the search must not find this zero again.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from stickslip.contact.cache import njit
 from stickslip.contact.planar.motion import TINY, L, X, Y, place, place_and_rates
 from stickslip.contact.planar.radau import INNER
 
-_SHORTEST = 1e-10  # step past a place where rounding hides the sign
+_SHORTEST = 1e-10  # step over times at which rounding hides the sign
 _MOST_STEPS = 4000
 _TIME_TOLERANCE = 1e-8
 
 
 @njit(**INNER)
 def never_reached(motion, z_x, z_y):  # type: ignore[no-untyped-def]
-    """Whether bounds prove that the force of a spring with its slider at z stays below the limit for ever."""
+    """Whether bounds prove that the force of a spring with its slider at z always stays below the limit."""
     bounds = motion.bounds
     reach = np.hypot(motion.waves[X, 0] - z_x, motion.waves[Y, 0] - z_y) + bounds[0]
     return reach <= motion.waves[L, 0] - (bounds[4] - abs(motion.waves[L, 0]))
@@ -34,7 +34,7 @@ def _square(motion, z_x, z_y, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _root(motion, z_x, z_y, left, right):  # type: ignore[no-untyped-def]
-    """Return the zero between `left` and `right`, where F rises from below to above zero."""
+    """Return the zero between `left` and `right`, at which F changes from negative to positive."""
     tau = 0.5 * (left + right)
     for _ in range(80):
         x, y, limit, x_rate, y_rate, limit_rate, _, _, _ = place_and_rates(motion, tau)
@@ -82,13 +82,13 @@ def slip_begins(motion, z_x, z_y, tau, end, after_slip):  # type: ignore[no-unty
     Parameters
     ----------
     motion
-        Motion under the contact.
+        Motion imposed on the contact.
     z_x, z_y
-        Place of its slider, in units of force.
+        Position of its slider, in units of force.
     tau, end
         Interval of time.
     after_slip
-        Whether the contact is at its limit at `tau` because slip ends there, or because it closes there.
+        Whether the contact is at its limit at `tau`, because slip ends or the contact closes.
     """
     b = motion.bounds
     reach = np.hypot(motion.waves[X, 0] - z_x, motion.waves[Y, 0] - z_y) + b[0]

@@ -1,6 +1,7 @@
-"""Motion of a planar contact while it is closed: stick and slip in turn, with located ends.
+"""Motion of a planar contact while it is closed: alternating stick and slip, with located transitions.
 
-The memory of the start travels along: the derivative of the slider's place z, or of the angle of slip, by the place at the start.
+The memory of the start is followed, too: the derivative of the slider's position z, or of the slip angle, by the
+initial position.
 """
 
 from typing import NamedTuple
@@ -28,21 +29,22 @@ from stickslip.contact.planar.slip import (
 from stickslip.contact.planar.stick import never_reached, slip_begins
 
 STARTED, CLOSED, FOLLOWED = (0, 1, 2)  # how a segment begins: with the period, with the contact, after another segment
-MODE, ANGLE, Z_X, Z_Y = range(4)  # of a state
+MODE, ANGLE, Z_X, Z_Y = range(4)  # entries of a state
 START, END, STATE, PLACE_X, PLACE_Y, DIRECTION, FIRST, COUNT, ORIGIN = range(9)  # columns of segments
 # columns of pieces; θ at start and stages fill the rest
 PIECE_START, PIECE_WIDTH, PIECE_KIND, PIECE_ANGLE = range(4)
 
 WIDEST = 3.0  # width of a piece times the highest harmonic
-TOLERANCE = 1e-6  # of the highest Legendre coefficient of θ on a piece, where L is largest: errors of integrals are about its square
-ROUGH = 1e-3  # the same on the way to a state from which Newton's method goes on
-_ACCEPTED = 2.0  # times the tolerance that steps aim at
+# for the highest Legendre coefficient of θ on a piece, at the largest L; errors of integrals are about its square
+TOLERANCE = 1e-6
+ROUGH = 1e-3  # the same tolerance on the way to a state that only starts Newton's method
+_ACCEPTED = 2.0  # times the tolerance: largest accepted error
 _GROWTH = 1.8
-_NEAR_END = 0.3  # of the widest piece, over which nodes may be crowded: at its start they are three times as far apart
+_NEAR_END = 0.3  # share of the widest piece up to which nodes may be crowded: they are wider apart at its start
 _SHORTEST = 1e-12
-_SLIGHT = 0.02  # least weight: derivatives do not vanish with the limit
-_FADING = 0.5  # of a piece at whose end force and time both fade away
-_BRIEF = 10.0  # pieces shorter than 1 / 10 have as much less weight
+_SLIGHT = 0.02  # smallest weight: derivatives do not vanish with the limit
+_FADING = 0.5  # factor on the weight of a piece at whose end the contact opens
+_BRIEF = 10.0  # pieces shorter than 1 / 10 have proportionally less weight
 
 
 class Course(NamedTuple):
@@ -52,17 +54,19 @@ class Course(NamedTuple):
     piece: Piece
     state: FloatArray  # (4,) stick or slip, angle of the force, place of the slider
     begun: FloatArray  # (4,) the state with which the period began
-    memory: FloatArray  # (2, 2) derivative of the place by that at the start; in slip row 0 is that of the angle
+    # (2, 2) derivative of the position by the initial one; in slip, row 0 is the derivative of the angle
+    memory: FloatArray
     segments: FloatArray  # (most, 9)
     pieces: FloatArray  # (most, stages + 4)
-    counts: IntArray  # (4,) segments, pieces, 1 where there was no room for all, and 1 where a rough course will do
+    # (4,) number of segments, number of pieces, 1 if there was no room for all, and 1 if a rough course suffices
+    counts: IntArray
 
 
 @njit(**INNER)
 def course_room(m):  # type: ignore[no-untyped-def]
     """Allocate a `Course` for polynomials of `m` coefficients.
 
-    A limit has at most 2 H zeros, and each end of an interval may need ever shorter pieces.
+    A limit has at most 2 H zeros, and each end of an interval may need increasingly short pieces.
     """
     order = (m - 1) // 2
     return Course(
@@ -79,7 +83,10 @@ def course_room(m):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def begin_at(course, tau, z_x, z_y):  # type: ignore[no-untyped-def]
-    """Set the state with the slider at z: on its limit, or beyond, the contact slips unless it moves inward."""
+    """Set the state for a slider at z.
+
+    At its limit, or beyond, the contact slips unless the motion leads inside the limit.
+    """
     x, y, limit = place(course.motion, tau)
     x_rate, y_rate, limit_rate = rates(course.motion, tau)
     x -= z_x
@@ -99,7 +106,7 @@ def begin_at(course, tau, z_x, z_y):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def begin_closed(course, tau):  # type: ignore[no-untyped-def]
-    """Set the state of a contact that closes: it sticks where its limit grows faster than the force of a slider at rest."""
+    """Set the state of a contact that closes: it sticks if the limit grows faster than the spring force."""
     x_rate, y_rate, limit_rate = rates(course.motion, tau)
     state = course.state
     course.memory[:] = 0.0
@@ -112,7 +119,7 @@ def begin_closed(course, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _start_to_slip(course, tau):  # type: ignore[no-untyped-def]
-    """Turn the state from stick to slip."""
+    """Change the state from stick to slip."""
     x, y, _ = place(course.motion, tau)
     state, memory = course.state, course.memory
     x -= state[Z_X]
@@ -140,7 +147,7 @@ def stop_slipping(course, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def closing_turn(motion, tau, angle):  # type: ignore[no-untyped-def]
-    """Return θ' of a contact that closes into slip."""
+    """Return θ' of a contact that slips from its closing on."""
     x_rate, y_rate, limit_rate = rates(motion, tau)
     x_bend, y_bend, _ = accelerations(motion, tau)
     across = y_bend * np.cos(angle) - x_bend * np.sin(angle)
@@ -167,7 +174,7 @@ def _first_piece(course, tau, origin, widest):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _attempt(course, tau, width, kind):  # type: ignore[no-untyped-def]
-    """Collocate a piece; return the estimate of its error in units of the tolerance, infinite where nothing was found."""
+    """Collocate a piece; return the estimate of its error in units of the tolerance, infinite without convergence."""
     piece, motion = course.piece, course.motion
     fill_stages(motion, tau, width, kind, piece.at)
     piece.angle[0] = course.state[ANGLE]
@@ -185,7 +192,7 @@ def _attempt(course, tau, width, kind):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _store(course, tau, width, kind):  # type: ignore[no-untyped-def]
-    """Append the piece, carry the memory over it, and move the state to its end."""
+    """Append the piece, follow the memory over it, and move the state to its end."""
     counts, piece = course.counts, course.piece
     if counts[1] == course.pieces.shape[0]:
         counts[2] = 1
@@ -203,7 +210,10 @@ def _store(course, tau, width, kind):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def _cut(course, tau, width, kind, share):  # type: ignore[no-untyped-def]
-    """Collocate the piece anew up to where slip ends; z is stationary there, so that the place needs no further correction."""
+    """Collocate the piece again up to the end of slip.
+
+    z is stationary there, so that the position needs no further correction.
+    """
     piece = course.piece
     even = np.int64(EVEN)  # a literal would be compiled once more
     whole = piece.angle.copy()
@@ -229,7 +239,7 @@ def _constant(piece):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _next_width(width, error, widest):  # type: ignore[no-untyped-def]
-    """Return the width that the next piece should have after one whose error was `error`, in units of the tolerance."""
+    """Return the width of the next piece after one with `error`, in units of the tolerance."""
     if not np.isfinite(error):
         return 0.25 * width
     change = 0.85 * max(error, 1e-3) ** (-1.0 / STAGES)
@@ -238,7 +248,10 @@ def _next_width(width, error, widest):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _slip(course, tau, end, origin, opens, widest):  # type: ignore[no-untyped-def]
-    """Slip from `tau` on until slip ends or the time does, and with `opens` the contact; return when."""
+    """Follow slip from `tau` until it ends or time `end` is reached, where with `opens` the contact opens.
+
+    Return the time.
+    """
     piece, counts = course.piece, course.counts
     width = _first_piece(course, tau, origin, widest)
     crowded = opens

@@ -1,1 +1,1 @@
-"""Steps of laws that call compiled functions of their own; whoever loads one loads numba."""
+"""Steps of laws that call their own compiled functions; importing one imports numba."""

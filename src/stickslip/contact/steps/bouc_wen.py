@@ -6,11 +6,11 @@ from stickslip.contact.addresses import compiled_step
 from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP, STICK
 
-# Gauss-Legendre points and weights on [0, 1] after s = y v², which makes broken powers of s smooth
+# Gauss-Legendre points and weights on [0, 1] after s = y v², which makes fractional powers of s smooth
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _V = 0.5 * (_POINTS + 1.0)
 _SQUARES, _FACTORS = _V**2, _WEIGHTS * _V
-STEPS = 60  # of Newton's method, which needs five or so
+STEPS = 60  # limit for Newton's method, which needs about five
 SATURATED = 40.0  # -log(1 - y) above which y = 1 to rounding
 
 
@@ -54,7 +54,7 @@ def loaded(y, u, n):  # type: ignore[no-untyped-def]
     target = _way_up(p, n)[0] + u
     if target > SATURATED / n + 1.0:
         return 1.0
-    for _ in range(STEPS):  # the way is concave in p: from below Newton's method goes up and overshoots at most once
+    for _ in range(STEPS):  # the integral is concave in p: from below, Newton's method overshoots at most once
         way, slope = _way_up(p, n)
         step = (target - way) / slope
         p = max(p + step, 0.0)
@@ -65,12 +65,12 @@ def loaded(y, u, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def unloaded(y, u, n, r):  # type: ignore[no-untyped-def]
-    """Solve ``dy/du = -(1 + r yⁿ)`` from y in [0, 1] over u >= 0; return y and, if it reaches zero, the rest of u."""
+    """Solve ``dy/du = -(1 + r yⁿ)`` from y in [0, 1] over u >= 0; return y and, if it reaches zero, the remaining u."""
     way = _way_down(y, n, r)
     if u >= way:
         return 0.0, u - way
     target = way - u
-    for _ in range(STEPS):  # the way is concave in y, too
+    for _ in range(STEPS):  # the integral is concave in y, too
         step = (target - _way_down(y, n, r)) * (1.0 + r * y**n)
         y = min(max(y + step, 0.0), 1.0)
         if abs(step) <= 1e-15:
@@ -80,7 +80,7 @@ def unloaded(y, u, n, r):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def advanced(y, u, n, r):  # type: ignore[no-untyped-def]
-    """Advance the share y of the limit, signed, by u, signed: return it with its derivatives by u and by its start."""
+    """Advance the signed share y of the limit by the signed u; return it with its derivatives by u and by its start."""
     if u == 0.0:
         return y, 1.0, 1.0
     sign = 1.0 if u > 0.0 else -1.0
@@ -101,7 +101,7 @@ def advanced(y, u, n, r):  # type: ignore[no-untyped-def]
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
-    """Integrate over the increment; the state is displacement and share of the largest z, of t, then of w."""
+    """Integrate over the increment; the state is displacement and share of the largest z, along t, then along w."""
     alpha, largest, initial, n, r, k_n = parameters[2:8]
     for d in range(2):
         k, x = parameters[d], displacement[d]

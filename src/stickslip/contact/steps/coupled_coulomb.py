@@ -1,15 +1,16 @@
-"""The step of the law coupled_coulomb, see `contact.laws.coupled_coulomb`: stick, and slip of a planar friction spring along a straight step.
+"""Stick and slip of a planar friction spring over one step, for the law `contact.laws.coupled_coulomb`.
 
-The tangential force is T = K (x - s) with K = diag(k_t, k_w) and |T| <= L. Where it slips, T = L e and the slider moves along e. With Δ the
-displacement over the step and D = L1 - L0 the direction obeys, in the share of the step,
+The tangential force is T = K (x - s) with K = diag(k_t, k_w) and |T| <= L. In slip, T = L e and the slider moves along
+e. With Δ the displacement over the step and D = L1 - L0, the direction obeys, over the share of the step,
 
     L e' = V - (e·V) e,   V = (k_t k_w Δ - (k_w - k_t)/2 D (e_t, -e_w)) / (e·K e).
 
-For equal stiffnesses V = k Δ is fixed, and with ℓ = ∫ ds/L the direction turns towards it by tan(δ/2) -> tan(δ/2) exp(-|V| ℓ): the exact
-solution. Otherwise V is taken at the middle of the step, where the same solution over half the step leads: an error of second order, without a
-bound on the step. A force that grows from nothing where the contact closes keeps its direction: Δ = (λ + D/K) e.
+For equal stiffnesses V = k Δ is constant, and with ℓ = ∫ ds/L the angle δ to V decreases by tan(δ/2) -> tan(δ/2)
+exp(-|V| ℓ): the exact solution. Otherwise V is taken at the middle of the step, which the same solution over half the
+step predicts: an error of second order, for steps of any size. A force that grows from zero where the contact closes
+keeps its direction: Δ = (λ + D/K) e.
 
-All derivatives of slip are those of the angle of e.
+All derivatives in slip are derivatives of the angle of e.
 """
 
 import math
@@ -18,15 +19,18 @@ from stickslip.contact.addresses import compiled_step
 from stickslip.contact.cache import njit
 from stickslip.contact.law import OPEN, SLIP, STICK
 
-SHALLOW = 1e-3  # relative change of the limit below which the series of its logarithm is better than the logarithm
-FAINT = 1e-290  # of a turning below which it has no direction
-UNKNOWN = 1e-16  # rounding of an angle
+SHALLOW = 1e-3  # relative change of the limit below which the logarithm is expanded in a series
+FAINT = 1e-290  # length of b below which it has no direction
+UNKNOWN = 1e-16  # rounding error of an angle
 _MAX_STEPS = 60  # Newton steps of a scalar equation; it is nearly linear, and most take three
 
 
 @njit(cache=True, error_model="numpy")
 def _towards(half, left):  # type: ignore[no-untyped-def]
-    """Return cosine and sine of the angle from b behind, from the tangent of half of it before, and parts of its derivatives."""
+    """Return cosine and sine of the final angle to b, and parts of its derivatives.
+
+    `half` is the tangent of half the initial angle.
+    """
     whole = 1.0 + (left * half) ** 2
     return (
         (1.0 - (left * half) ** 2) / whole,
@@ -40,8 +44,8 @@ def _towards(half, left):  # type: ignore[no-untyped-def]
 def _away_from(half, left):  # type: ignore[no-untyped-def]
     """Return the same from the cotangent of half the angle.
 
-    Exactly against b the direction stays, however unstable that is. Where the rest of the way would turn even an angle of rounding,
-    the force has vanished on it: there the direction is that of b.
+    A direction exactly opposite to b stays, although it is unstable. If the remaining displacement would turn even an
+    angle of rounding, the force has vanished on the way, and the direction is that of b.
     """
     if abs(half) < UNKNOWN:
         if left < UNKNOWN:
@@ -75,7 +79,7 @@ def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
     d_t, d_w = b_t / size, b_w / size
     left = math.exp(-size)
     cosine = d_t * e_t + d_w * e_w
-    if cosine < 0.0:  # by the cotangent of half the angle, which is exact where e is against b
+    if cosine < 0.0:  # by the cotangent of half the angle, which is exact for e opposite to b
         half = (d_t * (e_w + d_w) - d_w * (e_t + d_t)) / (1.0 - cosine)
         cos, sin, kept, swung = _away_from(half, left)
     else:
@@ -87,7 +91,7 @@ def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _inverse_mean(first, last, share):  # type: ignore[no-untyped-def]
-    """Return ∫ ds/L over the first `share` of a straight limit, and its derivatives by both ends."""
+    """Return ∫ ds/L over the first `share` of a linear limit, and its derivatives by both ends."""
     end = last if share == 1.0 else first + share * (last - first)
     r = (end - first) / first
     if abs(r) < SHALLOW:
@@ -114,7 +118,9 @@ def _pull(k_t, k_w, e_t, e_w, way_t, way_w, rise):  # type: ignore[no-untyped-de
 
 @njit(cache=True, error_model="numpy")
 def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-untyped-def]
-    """Integrate the direction of a slipping force over a straight displacement, while its size changes from `first` to `last`, both positive.
+    """Integrate the direction of a slipping force over a straight displacement.
+
+    The size of the force changes from `first` to `last`, both positive.
 
     Returns
     -------
@@ -189,16 +195,16 @@ def grown(k_t, k_w, way_t, way_w, last):  # type: ignore[no-untyped-def]
     )
 
 
-NOTHING = 1e-60  # of the force that it would have without a limit: a limit that is none
-OUTSIDE = 1e-3  # share of a step by which a start outside the limit may lie behind it
+NOTHING = 1e-60  # relative to the force without a limit: smaller limits count as zero
+OUTSIDE = 1e-3  # largest share of a step by which a start outside the limit may lie before the step
 
 
 @njit(cache=True, error_model="numpy")
 def _meeting(f_t, f_w, pull_t, pull_w, before, rise):  # type: ignore[no-untyped-def]
-    """Return the share of the step at which a spring that sticks meets the limit, and whether that moves with its start.
+    """Return the share of the step at which a sticking spring meets the limit, and whether it depends on the start.
 
-    It is beyond the limit at the end. From a start on the limit the share is zero but for rounding; a little outside it is
-    negative, so that the step is smooth there.
+    The spring is beyond the limit at the end. For a start on the limit the share is zero except for rounding; slightly
+    outside it is negative, so that the step is smooth there.
     """
     excess = f_t * f_t + f_w * f_w - before * before
     b = f_t * pull_t + f_w * pull_w - before * rise
@@ -208,7 +214,7 @@ def _meeting(f_t, f_w, pull_t, pull_w, before, rise):  # type: ignore[no-untyped
         share = -excess / (b + root)
         near = share > -OUTSIDE and -min(share, 0.0) * rise < 0.5 * before
         return (min(share, 1.0), True) if near else (0.0, False)
-    return (min((root - b) / a, 1.0), True) if a > 0.0 else (1.0, False)  # beyond by rounding alone
+    return (min((root - b) / a, 1.0), True) if a > 0.0 else (1.0, False)  # beyond only by rounding
 
 
 @njit(cache=True, error_model="numpy")
@@ -218,9 +224,9 @@ def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[n
     Returns
     -------
     e_t, e_w
-        Direction of the force behind the step.
+        Direction of the force after the step.
     p_t, p_w, p_ft, p_fw, p_before, p_after
-        Derivatives of its angle by the way, the force before and both limits.
+        Derivatives of its angle by the displacement, the initial force and both limits.
     """
     pull_t, pull_w, rise = k_t * way_t, k_w * way_w, after - before
     share, moves = _meeting(f_t, f_w, pull_t, pull_w, before, rise)
@@ -229,14 +235,14 @@ def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[n
     start = math.hypot(f_t, f_w)
     outside = moves and start > 0.0 and not abs(size - limit) <= OUTSIDE * limit
     o_t, o_w = f_t / start, f_w / start
-    if outside:  # a limit of rounding, far within the force before, which is brought back to it
+    if outside:  # the limit is only rounding, far below the initial force, which is brought back to it
         share, moves = _meeting(before * o_t, before * o_w, pull_t, pull_w, before, rise)
         m_t, m_w = before * o_t + share * pull_t, before * o_w + share * pull_w
         limit = before + share * rise
         size = math.hypot(m_t, m_w)
     a_t, a_w, rest = m_t / size, m_w / size, 1.0 - share
     e_t, e_w, kept, q_t, q_w, q_limit, q_after = slipped(k_t, k_w, a_t, a_w, rest * way_t, rest * way_w, limit, after)
-    turn_t, turn_w = -kept * a_w / size, kept * a_t / size  # by the force where it meets the limit
+    turn_t, turn_w = -kept * a_w / size, kept * a_t / size  # by the force at the limit
     by_share = turn_t * pull_t + turn_w * pull_w - q_t * way_t - q_w * way_w + q_limit * rise
     steep = m_t * pull_t + m_w * pull_w - limit * rise
     moved = -by_share / steep if moves and steep > 0.0 else 0.0
@@ -251,7 +257,7 @@ def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[n
 
 @njit(cache=True, error_model="numpy")
 def _keep(displacement, pressure, k, k_n, force, new_state, jac):  # type: ignore[no-untyped-def]
-    """Write the state behind the step: slider, displacement and pressure, with the derivatives that follow from those of the force."""
+    """Write the state after the step (slider, displacement and pressure) and its derivatives."""
     for d in range(2):
         new_state[d] = displacement[d]
         new_state[2 + d] = displacement[d]
@@ -267,7 +273,7 @@ def _keep(displacement, pressure, k, k_n, force, new_state, jac):  # type: ignor
 
 @njit(cache=True, error_model="numpy")
 def _closed_share(pressure, before, k_n):  # type: ignore[no-untyped-def]
-    """Return the share of the step behind the closing of the contact, its derivatives by the normal gap and by the pressure before."""
+    """Return the closed share of the step, and its derivatives by the normal gap and the previous pressure."""
     if before > 0.0 or pressure <= before:
         return 1.0, 0.0, 0.0
     change = pressure - before
@@ -276,7 +282,7 @@ def _closed_share(pressure, before, k_n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _stick_rows(k, way, closing, share, jac):  # type: ignore[no-untyped-def]
-    """Fill the derivatives of a force that sticks; `share` is what `_closed_share` returns."""
+    """Fill the derivatives of a sticking force; `share` is the result of `_closed_share`."""
     for d in range(2):
         jac[d, d] = k[d] * share[0]
         if closing:
@@ -289,9 +295,9 @@ def _stick_rows(k, way, closing, share, jac):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _slip(way, state, parameters, limit, closing, share, force, jac):  # type: ignore[no-untyped-def]
-    """Fill a force that slips, and its derivatives."""
+    """Fill a slipping force and its derivatives."""
     k_t, k_w, k_n, mu, _ = parameters
-    # derivatives of its angle: by the gap t, w, n, by slider, displacement and pressure before
+    # derivatives of its angle: by the gap t, w, n, and by previous slider, displacement and pressure
     if closing:
         part, by_gap, by_before = share
         e_t, e_w, q_t, q_w, q_limit = grown(k_t, k_w, part * way[0], part * way[1], limit)
@@ -331,7 +337,10 @@ def _slip(way, state, parameters, limit, closing, share, force, jac):  # type: i
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
-    """Stick, slip and open along the straight way from the step before; the state is slider (2), displacement (2) and pressure there."""
+    """Stick, slip and open over a straight displacement.
+
+    The state is slider (2), displacement (2) and pressure at the previous step.
+    """
     k_t, k_w, k_n, mu, preload = parameters
     k = (k_t, k_w)
     pressure = preload - k_n * displacement[2]

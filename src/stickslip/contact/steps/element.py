@@ -26,7 +26,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
     jac[2, 2] = slope
     for d in range(2):
         k, x, s = parameters[d], displacement[d], state[d]
-        if k == 0.0 or is_open or parameters[MU] == 0.0:  # without friction the slider follows, also where x rests
+        if k == 0.0 or is_open or parameters[MU] == 0.0:  # without friction the slider follows, even if x does not move
             status[d] = OPEN if is_open else STICK if k == 0.0 else SLIP
             force[d] = 0.0
             new_state[d] = x
@@ -34,7 +34,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
             continue
         started = not np.isnan(s)
         trial = k * (x - s) if started else parameters[RESIDUAL] * limit
-        # x - s of a slider that rests at its limit is off by rounding
+        # x - s of a slider at rest on its limit is off by rounding
         if started and abs(trial) <= limit + ROUND_OFF * k * (abs(x) + abs(s)):
             status[d] = STICK
             force[d] = trial
