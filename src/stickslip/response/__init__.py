@@ -1,4 +1,4 @@
-"""The questions engineers ask, as functions of a system and a load."""
+"""Analyses as functions of a system and a load."""
 
 import warnings
 from importlib import import_module
@@ -9,7 +9,7 @@ import lazy_loader
 _public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 _BY_SWEEP = "forced_response solves rigid contacts, too, and signals returns their forces and states"
 _BY_WAVE = "call campbell with the travelling_wave of each wave number"
-# public in 0.1, until 0.3: the module, and what does the same
+# public in 0.1, until 0.3: the module and the replacement
 _DEPRECATED = {
     "rigid_response": ("rigid", _BY_SWEEP),
     "RigidPoint": ("rigid", _BY_SWEEP),

@@ -1,8 +1,8 @@
-"""Static equilibrium of a rigid damper on its flanks: normal forces, T/N, and which flanks can slip at all.
+"""Static equilibrium of a rigid damper on its flanks: normal forces, T/N, and whether a flank can slip.
 
-Under its pull a damper is in equilibrium for many friction forces. The largest T/N that a flank reaches in any of them is a linear program: forces
-within the friction cones of all points balance the pull, and the friction along the flank is as large as possible. Below the friction coefficient the
-flank cannot slip, however hard the blades move (C. Gastaldi, T. M. Berruti, International Journal of Non-Linear Mechanics 92 (2017) 25-40, section
+Under its pull a damper is in equilibrium with many combinations of friction forces. A linear program gives the largest T/N of a flank among them: forces
+within the friction cones of all points balance the pull, and the friction along the flank is maximised. If this T/N is below the friction coefficient, the
+flank cannot slip, for any motion of the blades (C. Gastaldi, T. M. Berruti, International Journal of Non-Linear Mechanics 92 (2017) 25-40, section
 7: platform angles which do not allow the flat side to slip). The inertia of the damper is neglected.
 """
 
@@ -15,11 +15,11 @@ import scipy.optimize
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.response.system import System
 
-CONE_RAYS = 8  # of a friction cone, of which four lie along t and w
+CONE_RAYS = 8  # rays of a friction cone, four of them along t and w
 NO_SLIP = 0.999  # share of the friction coefficient below which a flank does not slip
-ANGLES_DEG = np.arange(3.0, 88.0, 6.0)  # inclinations of a flank, from square to the pull to along it
+ANGLES_DEG = np.arange(3.0, 88.0, 6.0)  # inclinations of a flank: small if perpendicular to the pull, large along it
 ANGLE_TOLERANCE_DEG = 0.25  # of the ends of a range of angles
-FLAT = 0.05  # rad between the normals of a flank's points above which it is no plane
+FLAT = 0.05  # largest angle between the normals of a plane flank, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Flank:
     directions
         (p, 3, 3) unit vectors t, w, n of each point; the damper presses along minus n.
     points
-        (p, 3) places from the centre of mass, m.
+        (p, 3) positions relative to the centre of mass, m.
     force
         (p, 3) forces of the damper on the platform at rest along t, w, n, N.
     mu
@@ -53,7 +53,7 @@ class Flank:
 
     @property
     def friction(self) -> float:
-        """Most friction of all points at rest over their normal force, if it is all used."""
+        """Friction limit of all points at rest over their normal force."""
         pressed = np.maximum(-self.force[:, 2], 0.0)
         return float(np.average(self.mu, weights=pressed)) if pressed.any() else float(self.mu.mean())
 
@@ -85,7 +85,7 @@ class Flank:
 
 @dataclass(frozen=True, eq=False)
 class FlankLimits:
-    """Possible friction of a flank.
+    """Limits of the friction on a flank.
 
     Attributes
     ----------
@@ -94,9 +94,9 @@ class FlankLimits:
     most
         Largest T/N in both senses along t, in static equilibrium.
     angle_deg
-        Inclination of the flank, degrees: 0 where it is square to the pull, 90 along the pull; NaN for a flank that is no plane.
+        Inclination of the flank, degrees: 0 perpendicular to the pull, 90 along the pull; NaN for a flank that is no plane.
     held_deg
-        Ranges of this angle in which the flank cannot slip to and fro, with the other flanks as they are.
+        Ranges of this angle in which the flank cannot slip to and fro, with the other flanks unchanged.
     """
 
     flank: Flank
@@ -119,9 +119,9 @@ class DamperStatics:
     name
         Name of the part.
     pull
-        Resultant of all forces but those of the contacts, N.
+        Resultant of all forces except contact forces, N.
     flanks
-        Its flanks.
+        Flanks of the damper.
     """
 
     name: str
@@ -130,7 +130,7 @@ class DamperStatics:
 
 
 def flanks_of(system: System, groups: tuple[str, ...], static_force: FloatArray) -> dict[str, tuple[Flank, ...]]:
-    """Return the flanks of each free rigid body that contacts with a friction coefficient touch.
+    """Return the flanks of each free rigid body, formed by contacts with a friction coefficient.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def _flanks(system: System, rows: FloatArray, groups: tuple[str, ...], static_fo
 
 
 def statics_of(name: str, flanks: tuple[Flank, ...]) -> DamperStatics | None:
-    """Return the limits of the flanks of a damper; None where nothing presses one of them at rest.
+    """Return the limits of the flanks of a damper; None if a flank has no normal force at rest.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def statics_of(name: str, flanks: tuple[Flank, ...]) -> DamperStatics | None:
 
 
 def largest_ratios(flanks: tuple[Flank, ...], k: int, pull: FloatArray) -> tuple[float, float]:
-    """Return the largest T/N of flank `k` along t and along minus t in static equilibrium; NaN where there is none.
+    """Return the largest T/N of flank `k` along t and along minus t in static equilibrium; NaN without an equilibrium.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def _largest(flanks: tuple[Flank, ...], k: int, pull: FloatArray, sense: float) 
     columns, friction, normal = _rays(flanks, k)
     reach = max(float(np.abs(np.concatenate([flank.points for flank in flanks])).max()), np.finfo(float).tiny)
     scale = np.r_[np.ones(3), np.full(3, 1.0 / reach)]
-    # one more unknown: the pull, while the normal force of the flank is one
+    # the pull is an additional unknown, as the normal force of the flank is set to one
     balance = np.column_stack([scale[:, None] * columns, -scale * pull / np.linalg.norm(pull[:3])])
     equal, right = np.vstack([balance, np.r_[normal, 0.0]]), np.r_[np.zeros(6), 1.0]
     solved = scipy.optimize.linprog(-sense * np.r_[friction, 0.0], A_eq=equal, b_eq=right)
@@ -230,13 +230,13 @@ def _rays(flanks: tuple[Flank, ...], k: int) -> tuple[FloatArray, FloatArray, Fl
 
 
 def _held_angles(flanks: tuple[Flank, ...], k: int, pull: FloatArray) -> tuple[float, tuple[tuple[float, float], ...]]:
-    """Return the inclination of flank `k`, and the ranges of it in which the flank cannot slip, degrees."""
+    """Return the inclination of flank `k`, and its ranges without slip, degrees."""
     flank, along = flanks[k], pull[:3] / np.linalg.norm(pull[:3])
     axis, normal = flank.directions[:, 1].mean(axis=0), flank.directions[:, 2].mean(axis=0)
     axis = axis / np.linalg.norm(axis)
     cosine = float(normal @ along) / np.linalg.norm(normal)
     own = float(np.degrees(np.arccos(np.clip(abs(cosine), 0.0, 1.0))))
-    # turning by a small angle tells in which sense the flank becomes steeper
+    # a small turn shows in which sense the flank becomes steeper
     turned = flank.turned(1e-3, axis).directions[:, 2].mean(axis=0)
     sense = 1.0 if abs(float(turned @ along)) / np.linalg.norm(turned) < abs(cosine) else -1.0
 
@@ -249,7 +249,7 @@ def _held_angles(flanks: tuple[Flank, ...], k: int, pull: FloatArray) -> tuple[f
 
 
 def _ranges(at: FloatArray, holds: BoolArray, held: Callable[[float], bool]) -> tuple[tuple[float, float], ...]:
-    """Return the ranges in which `held` is true, their ends bisected."""
+    """Return the ranges in which `held` is true, with ends found by bisection."""
     ends = [float(at[0])] if holds[0] else []
     for j in np.flatnonzero(np.diff(holds.astype(int))):
         low, high = float(at[j]), float(at[j + 1])

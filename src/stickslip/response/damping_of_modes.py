@@ -1,8 +1,8 @@
 """Modes in a frequency range: damping without friction, largest damping by friction, and the parts that move.
 
-Friction is the Coulomb limit of each contact, whatever its law. Every contact that slips is a spring of the complex stiffness ``k η(x)``, with one
-slip ratio x of all contacts: the amplitude of their gaps over that at which they begin to slip. From stuck (x = 1) to sliding (x large) each mode is
-followed by its shape. It is an estimate, no bound: for chains of masses it was right within a factor of 1.5, where normal loads stay as they are.
+Each contact law is replaced by its Coulomb limit. A slipping contact is a spring with the complex stiffness ``k η(x)``, with the same slip ratio x
+for all contacts: the gap amplitude over the amplitude at the onset of slip. From stuck (x = 1) to sliding (x large), each mode is tracked by its shape.
+The result is an estimate, no bound: for chains of masses with constant normal loads it was right within a factor of 1.5.
 """
 
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from stickslip.response.self_excited.modes import StuckMode, sprung_modes
 from stickslip.response.system import System
 from stickslip.units import HZ
 
-UNDAMPED_RATIO = 1e-5  # damping ratio below which nothing damps a mode
-SPANNED = 60  # coordinates up to which eigenvalues are those of all motions
-UNDRIVEN = 1e-9  # force on a mode over the norms of force and shape: below, the load stands at a node
-FIRST_MODES = 4  # asked for at first; twice as many until they pass the range
+UNDAMPED_RATIO = 1e-5  # damping ratio below which a mode is undamped
+SPANNED = 60  # coordinates up to which all eigenvalues are computed
+UNDRIVEN = 1e-9  # modal force over the norms of force and shape, below which the load acts at a node
+FIRST_MODES = 4  # initial number of modes; doubled until they exceed the range
 ALONE = 0.99  # share of the strain energy in contact springs, and of the kinetic energy in one part
-TRAVEL_M = 1e6  # amplitude of a cycle in which every slider has slipped far, of a model without dimensions, too
-SAMPLES = 256  # of the cycle, for laws that are marched
-ROUNDING = 1e-13  # of the force of a spring beside the slider: dissipation below is rounding
-SLIP_RATIOS = np.geomspace(1.0, 1e4, 20)  # amplitude over that at which slip begins
-BEYOND = 1.3  # frequencies of modes that span the motions, over the highest of the range
-INDEPENDENT = 1e-10  # least share of a motion that the others do not span
-SMALLEST_DAMPING = 1e-4  # ratio below which friction does nothing that is worth a word
+TRAVEL_M = 1e6  # amplitude of a cycle with full slip in every slider, also for dimensionless models
+SAMPLES = 256  # of the cycle, for sampled laws
+ROUNDING = 1e-13  # slip limit over the force of a parallel spring, below which it is rounding
+SLIP_RATIOS = np.geomspace(1.0, 1e4, 20)  # amplitude over the amplitude at the onset of slip
+BEYOND = 1.3  # highest frequency of the modes in the basis, over the highest of the range
+INDEPENDENT = 1e-10  # smallest relative eigenvalue of independent basis motions
+SMALLEST_DAMPING = 1e-4  # smallest reported damping ratio by friction
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ class Friction:
 def friction_of(interface: Interface, static_gap: FloatArray, static_force: FloatArray) -> Friction:
     """Return the friction of contacts at static gaps (n_contacts, 3), m, under static forces (n_contacts, 3), N.
 
-    Every law is evaluated over a cycle of large amplitude in t and then in w, with its normal gap at rest. The dissipation is four times
-    the slip force times the amplitude. Springs without slip and open contacts have no limit.
+    Each law is evaluated over a cycle of large amplitude in t and then in w, with its static normal gap. The dissipation is four times the
+    slip force times the amplitude. Springs without slip, and open contacts, have no limit.
     """
     n = interface.n_contacts
     compiled = interface.compiled()
@@ -85,13 +85,13 @@ def friction_of(interface: Interface, static_gap: FloatArray, static_force: Floa
 
 @dataclass(frozen=True)
 class Range:
-    """Frequencies of the excitation from `lowest` to `highest`, rad/s."""
+    """Range of excitation frequencies, rad/s."""
 
     lowest: float
     highest: float
 
     def holds(self, omega: float) -> bool:
-        """Whether a frequency of the excitation lies within."""
+        """Whether an excitation frequency lies within the range."""
         return self.lowest <= omega <= self.highest
 
     @property
@@ -102,7 +102,7 @@ class Range:
 
 @dataclass(frozen=True, eq=False)
 class RangeMode:
-    """A mode that a harmonic of a load passes within the range.
+    """Mode that a harmonic of the load meets within the range.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class RangeMode:
     strain
         Share of the strain energy in contact springs.
     part, kinetic
-        Part with the largest kinetic energy, and its share of it.
+        Part with the largest kinetic energy, and its share of the total.
     """
 
     harmonic: int
@@ -151,13 +151,13 @@ class RangeMode:
 
     @property
     def on_contacts(self) -> bool:
-        """Whether one part alone moves, as a rigid body on the springs of its contacts."""
+        """Whether only one part moves, as a rigid body on its contact springs."""
         return self.strain > ALONE and self.kinetic > ALONE
 
     def excess(self, friction: Friction) -> float:
-        """Return the modal force over 4/π times the modal Coulomb limit. Above 1 friction alone cannot bound the resonance.
+        """Return the modal force over 4/π times the modal Coulomb limit; above 1, friction alone cannot bound the resonance.
 
-        It is infinite without friction, and zero where the limit changes with the normal motion of the mode and so grows with it.
+        It is infinite without friction, and zero if the limit grows with the normal motion of the mode.
         """
         size, along = np.abs(self.gaps), np.abs(self.gaps[:, :2])
         grows = size[:, 2] * along.max(axis=1, initial=0.0)
@@ -185,7 +185,7 @@ def range_modes(system: System, load: HarmonicLoad, within: Range, springs: Floa
     within
         Frequencies of the excitation.
     springs
-        (3 n_contacts,) stiffnesses, N/m: `springs_of`.
+        (3 n_contacts,) stiffnesses from `springs_of`, N/m.
     """
     here, found = system.at(within.middle), []
     for h, force in sorted(load.harmonics.items()):
@@ -234,7 +234,7 @@ def _share(in_springs: float, structure: Structure, mode: StuckMode) -> float:
 
 
 def _most_moved(structure: Structure, mode: StuckMode) -> tuple[str, float]:
-    """Return the part with most kinetic energy and its share; no part where the model has one alone."""
+    """Return the part with the largest kinetic energy and its share; an empty name if the model has one part."""
     energy = np.real(np.conj(mode.shape) * (structure.mass @ mode.shape))
     whose = np.array(structure.dofs.part)
     each = {str(part): float(energy[whose == part].sum()) for part in np.unique(whose)}
@@ -245,7 +245,7 @@ def _most_moved(structure: Structure, mode: StuckMode) -> tuple[str, float]:
 
 
 def complex_stiffness(ratio: float) -> complex:
-    """Return the describing function of a spring with a slider over the spring stiffness, at `ratio` times the amplitude of first slip."""
+    """Return the describing function of a spring with a slider, over its stiffness, at `ratio` times the amplitude at the onset of slip."""
     if ratio <= 1.0:
         return 1.0 + 0.0j
     angle = np.arccos(1.0 - 2.0 / ratio)
@@ -302,7 +302,7 @@ def damped_modes(
 
     Notes
     -----
-    Motions are spanned by the modes with contacts stuck and those with contacts sliding, up to `BEYOND` of the range.
+    The basis consists of the modes with stuck contacts and with sliding contacts, up to `BEYOND` times the highest frequency.
     """
     here = system.at(within.middle)
     slips = friction.slips & (springs > 0.0)
@@ -341,7 +341,7 @@ def _spanned(mass: ComplexArray, shapes: ComplexArray) -> ComplexArray:
 
 
 def _followed(rest: ComplexArray, slider: ComplexArray) -> ComplexArray:
-    """Return the (20, m) squares of the frequencies of each mode from stuck to sliding."""
+    """Return the (20, m) squared complex frequencies of each mode from stuck to sliding."""
     values, vectors = np.linalg.eigh(rest + slider)
     every = [values.astype(complex)]
     for ratio in SLIP_RATIOS[1:]:
@@ -354,7 +354,7 @@ def _followed(rest: ComplexArray, slider: ComplexArray) -> ComplexArray:
 
 
 def _partners(alike: FloatArray) -> IntArray:
-    """Return for each row the column that it is most alike, none twice."""
+    """Assign to each row its most similar column, none twice."""
     order = np.zeros(len(alike), dtype=np.int64)
     alike = alike.copy()
     for _ in order:

@@ -1,4 +1,4 @@
-"""Static equilibrium under the centrifugal load, before anything vibrates: displacements, contact forces, and the contact state for small vibrations."""
+"""Static equilibrium under the centrifugal load: displacements, contact forces, and contact states for small vibrations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,12 +26,12 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
 HOLDING = StepControl(scale=1.0, first=0.05, largest=0.5, smallest=1e-5)
-FAR = 1e6  # m: no contact is closed there, of a model without dimensions either
+FAR = 1e6  # m: gap at which every contact is open, also in dimensionless models
 
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """The balance with a spring on every coordinate, as a share p of the typical contact stiffness; p = 0 is the real problem."""
+    """Static problem with an additional spring on every coordinate, p times the typical contact stiffness; p = 0 is the real problem."""
 
     balance: HarmonicBalance
 
@@ -61,7 +61,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
     SingularError
         If a body has no support (the message names the coordinate), or no equilibrium is found.
     """
-    # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
+    # a residual traction is a force without stiffness: it shifts the mean of the vibration, not the seat of the damper
     interface = replace(system.springs, laws=tuple(map(_unstretched, system.springs.laws)))
     resting = float(np.max(np.abs(interface.resting_force()), initial=0.0))
     if not np.any(static_load) and resting == 0.0:
@@ -69,7 +69,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
     options = Newton(max_iterations=60)
     linear = system.condensed(HarmonicLoad(static_load), 0)
     balance = harmonic_balance(linear, interface, 0, 1)
-    # a faint static load beside a large preload cannot be resolved better than the preload's own rounding
+    # the rounding of a large preload limits the accuracy under a small static load
     coarser = max(1.0, resting / balance.force_scale)
     balance = replace(
         balance, force_scale=coarser * balance.force_scale, displacement_scale=coarser * balance.displacement_scale
@@ -90,7 +90,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
 def frozen_sliders(system: System, static_load: FloatArray, friction_share: float = 1.0) -> System:
     """Return the system with all sliders at their positions in the static equilibrium.
 
-    A vibration without slip and lift-off is then linear about the static state: harmonics and static part are independent
+    Without slip and lift-off, a vibration is then linear about the static state, and the static part is independent of the harmonics
     (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off loses its initial position.
 
     Parameters
@@ -139,9 +139,9 @@ def _unstretched(law: ContactLaw) -> ContactLaw:
 
 
 def _released(balance: HarmonicBalance, options: Newton) -> Solution:
-    """Hold every coordinate by a spring and let go of it by continuation.
+    """Solve with a spring on every coordinate, and remove the springs by continuation.
 
-    A wedged damper that rolls onto its seat passes states from which Newton finds no way: everything slips, one line is open.
+    A wedged damper that rolls onto its seat passes states from which Newton's method fails, with all contacts slipping and some open.
     """
     held = _Held(balance)
     following = Following(newton=options, control=HOLDING, weights=np.ones(balance.size))
@@ -173,7 +173,7 @@ def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArra
         if h == 0:
             static = _static(real_part(matrix), load[0].real)
             if static is None and any(map(_hardens, system.interface.laws)):
-                # held by springs without a stiffness at rest: Newton's method goes on from what the others hold
+                # hardening springs hold the rest: Newton's method continues from the other coordinates' equilibrium
                 static = np.linalg.lstsq(as_array(matrix.real), load[0].real, rcond=None)[0]
             if static is None:
                 raise SingularError(_unheld(as_array(matrix.real), system))
@@ -184,12 +184,12 @@ def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArra
 
 
 def _hardens(law: ContactLaw) -> bool:
-    """Whether a law holds along a direction in which it has no stiffness at rest."""
+    """Whether a law has a restoring force along a direction without stiffness at rest."""
     return bool(np.any(holding_directions(law) & ~(law.stuck_stiffness() > 0.0)))
 
 
 def _static(matrix: Matrix, right: FloatArray) -> FloatArray | None:
-    """Return the solution; None where the matrix is singular."""
+    """Return the solution; None if the matrix is singular."""
     if not scipy.sparse.issparse(matrix):
         return solve_dense(matrix, right)
     try:
@@ -209,7 +209,7 @@ def _unheld(matrix: FloatArray, system: System) -> str:
 
 
 def holding(system: System, static_load: FloatArray) -> BoolArray:
-    """Return the contact points (p,) of a system that stick in small vibrations under a static load (n,), N."""
+    """Return whether each contact point (p,) of a system sticks in small vibrations under a static load (n,), N."""
     gap = system.interface.gap_operator[:, system.retained] @ preload(system, static_load)
     force = static_contact_force(system.springs, gap)
     return pressed_by(system.springs.laws, force)
@@ -222,7 +222,7 @@ def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
 
 
 def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
-    """Return which contact points (p,) stick in small vibrations: those under pressure, and those whose law never opens.
+    """Return whether each contact point (p,) sticks in small vibrations: it is under pressure, or its law never opens.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
 
 
 def opening(laws: Sequence[ContactLaw]) -> BoolArray:
-    """Return which contact points (p,) have a law that opens at large distance."""
+    """Return whether the law of each contact point (p,) opens at a large gap."""
     found: dict[int, bool] = {}
     for law in laws:
         found.setdefault(id(law), _opens(law))
@@ -243,7 +243,7 @@ def opening(laws: Sequence[ContactLaw]) -> BoolArray:
 
 
 def _opens(law: ContactLaw) -> bool:
-    """Return whether a law opens at a large gap."""
+    """Whether a law opens at a large gap."""
     state = law.initial_state()
     jac = np.zeros((3 + state.size, 6 + state.size))
     status = np.empty(2, dtype=np.int64)

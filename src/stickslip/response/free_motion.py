@@ -1,7 +1,7 @@
-"""Dampers whose mean position nothing determines.
+"""Detection of free dampers with an undetermined mean position.
 
-A contact that slips or opens in every cycle forgets its mean position. When all contacts do, the coordinates of a free damper that no
-normal spring holds may drift: the Jacobian is singular, and the static part of the solution along them means nothing.
+A contact that slips or opens in every cycle forgets its mean position. If all contacts of a free damper do, its coordinates without a
+normal spring may drift: the Jacobian is singular, and the static part of the solution along them is meaningless.
 """
 
 from collections.abc import Callable
@@ -21,9 +21,9 @@ from stickslip.solve.krylov import Krylov
 Held = tuple[float, FloatArray]  # smallest over largest singular value, and vector of the smallest
 Product = Callable[[FloatArray], FloatArray]
 
-STEPS = 12  # of each iteration: a vector that nothing holds appears in two or three
-SETTLED = 0.01  # relative change of a singular value at which they end
-MANY = 2000  # unknowns from which products are cheaper than an array's factors
+STEPS = 12  # of each iteration; an undetermined vector appears in two or three
+SETTLED = 0.01  # relative change of a singular value that ends an iteration
+MANY = 2000  # unknowns above which matrix-vector products are cheaper than LU factors
 SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian below which a coordinate counts as undetermined
 
 
@@ -56,7 +56,7 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
     problem
         System, load and sweep.
     point
-        A point of the response, converged or not.
+        Point of the response, converged or not.
     """
     balance = problem.balance(point.support)
     at = balance.linearise(balance.unknowns(point.coefficients), point.omega)
@@ -71,7 +71,7 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
 
 
 def as_array(jac: FloatArray) -> Held:
-    """Find the smallest over the largest singular value, and the vector of the smallest, by iterations on one LU factorisation.
+    """Return the ratio of smallest to largest singular value, and the vector of the smallest, by iterations on one LU factorisation.
 
     Rows and columns are balanced first: translations and rotations differ by orders of magnitude.
     """
@@ -84,7 +84,7 @@ def as_array(jac: FloatArray) -> Held:
     lu, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
     tiny = np.finfo(float).eps * largest
     diagonal = np.einsum("ii->i", lu)
-    # a singular matrix is told by its vector, not by a division by zero
+    # avoid a division by zero for a singular matrix, whose vector is wanted
     diagonal[np.abs(diagonal) < tiny] = tiny
     solve = partial(scipy.linalg.lu_solve, (lu, pivots))
     inverse, small = _largest(partial(solve, trans=1), solve, second)
@@ -92,9 +92,9 @@ def as_array(jac: FloatArray) -> Held:
 
 
 def by_products(jac: StructuredJacobian) -> Held | None:
-    """Find the same singular value by matrix-vector products, for thousands of contacts; None if an iteration does not converge.
+    """Return the same ratio and vector by matrix-vector products, for thousands of contacts; None if an iteration does not converge.
 
-    Each coordinate is balanced in each harmonic by its coupling within that harmonic.
+    Each coordinate is balanced in each harmonic by its coupling within this harmonic.
     """
     most = [abs(block).max(axis=0) for _, block in jac.own_blocks()]
     own = np.array([a.toarray().ravel() if scipy.sparse.issparse(a) else a for a in most])
@@ -118,7 +118,7 @@ def by_products(jac: StructuredJacobian) -> Held | None:
 
 
 def _largest(first: Product, second: Product, vector: FloatArray) -> Held:
-    """Return the largest singular value of the product `second` after `first`, and its vector."""
+    """Return the largest singular value of an operator, given by `first` and then `second`, and its vector."""
     value = 0.0
     for _ in range(STEPS):
         before = value
@@ -130,7 +130,7 @@ def _largest(first: Product, second: Product, vector: FloatArray) -> Held:
 
 
 def _unit(vector: FloatArray) -> tuple[FloatArray, float]:
-    """Return a vector of unit length and the length, whose square may be beyond all numbers."""
+    """Return a vector of unit length and the original length, whose square may overflow."""
     most = float(np.max(np.abs(vector)))
     scaled = vector / most
     length = float(np.linalg.norm(scaled))

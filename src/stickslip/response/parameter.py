@@ -1,4 +1,4 @@
-"""Periodic motion over any parameter: solution branches at one frequency, and the common part of such analyses."""
+"""Periodic motion over any parameter: solution branches at one frequency, and shared functions of such analyses."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ LoadName = Literal["excitation", "static_load"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Discretisation:
-    """How a periodic motion is represented and solved for.
+    """Discretisation and solver of a periodic motion.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ class Discretisation:
     samples
         Samples per period of the contact forces.
     evaluator
-        How piecewise-linear laws are evaluated; ``events`` has no sampling error, so that amplitudes are smooth in every parameter.
+        Evaluation of piecewise-linear laws; ``events`` has no sampling error, so that amplitudes are smooth in every parameter.
     newton
-        Corrector.
+        Corrector options.
 
     Raises
     ------
@@ -58,14 +58,14 @@ class Discretisation:
         check_quantities(self)
 
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
-        """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
+        """Set up the periodic problem; the dofs `more` are retained in addition to the contact dofs."""
         linear = system.condensed(load, self.order, more)
         return harmonic_balance(linear, system.interface, self.order, self.samples, self.evaluator)
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterPoint:
-    """A point of a branch along a parameter.
+    """Point of a branch along a parameter.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def parameter_family(
     first: float,
     made: Callable[[System, HarmonicLoad], HarmonicBalance],
 ) -> BalanceAt:
-    """Return the balances of `made` as a function of a parameter, as defined in `branch_in_parameter`."""
+    """Return the balances of `made` as a function of a parameter; see `branch_in_parameter`."""
     if callable(parameter):
         build = parameter
         return rebuilt(lambda value: made(*build(value)), first)
@@ -123,7 +123,7 @@ def branch_in_parameter(
     points: int = 40,
     discretisation: Discretisation | None = None,
 ) -> Iterator[ParameterPoint]:
-    """Follow the periodic motion at one frequency while a parameter varies, around folds where there are any.
+    """Follow the periodic motion at one frequency while a parameter varies, around folds.
 
     Parameters
     ----------
@@ -140,15 +140,15 @@ def branch_in_parameter(
     omega
         Frequency, rad/s.
     points
-        Smallest number of points; more are taken where the motion changes fast.
+        Smallest number of points; more are added where the motion changes fast.
     discretisation
         Harmonics, samples, solver.
 
     Yields
     ------
     ParameterPoint
-        Points in the order of the branch, the last one at the end of the span. Where the branch cannot be followed, a point that did not
-        converge, and a new beginning a little further on.
+        Points in the order of the branch, the last one at the end of the span. Where the branch is lost, a point without convergence
+        follows, and a restart a little further on.
 
     Raises
     ------

@@ -1,11 +1,12 @@
 """Sensitivity of a resonance peak to the contact model: to the contact stiffness, and to the number of contact points.
 
-A solution of ``R(x, ω, κ) = 0``, with κ the logarithm of a factor on all contact stiffnesses, moves by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
-forces depend on κ; their derivative is a difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak
-amplitude changes as the amplitude at a fixed frequency does. Solved points stand beside the peak. Two of them, a little apart, give the
-slopes of ``∂A/∂ω`` and of ``∂A/∂κ``, from these the place of the peak, ``dω/dκ = -A_κω / A_ωω`` there, and ``∂A/∂κ`` at it.
+A solution of ``R(x, ω, κ) = 0``, with the logarithm κ of a factor on all contact stiffnesses, changes by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
+forces depend on κ; their derivative is a finite difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak
+amplitude has the same derivative as the amplitude at a fixed frequency. Solved points lie near the peak, not on it. Two of them with slightly different
+frequencies give the derivatives of ``∂A/∂ω`` and ``∂A/∂κ`` by the frequency, and from these the peak frequency, its derivative ``dω/dκ = -A_κω / A_ωω``
+and ``∂A/∂κ`` at the peak.
 
-With half as many contact points each point stands for two neighbours and sees the mean of their gaps.
+With half as many contact points, each point represents two neighbours and their mean gap.
 """
 
 from collections.abc import Sequence
@@ -24,11 +25,11 @@ from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 
 STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields of laws, N/m and N/m³
-STEP = 1e-5  # relative step of stiffness, and of the motion for the amplitude: central differences
-APART = 1e-4  # relative distance of two frequencies whose slopes are compared
+STEP = 1e-5  # relative step of the stiffness, and of the motion for the amplitude, in central differences
+APART = 1e-4  # relative distance of the two frequencies
 TINY = float(np.finfo(float).tiny)
-PEAK_DISTANCE_RTOL = 0.005  # relative distance from a solved point within which its peak lies
-FEWEST_HALVED = 8  # points of a contact below which half of them would hold it otherwise
+PEAK_DISTANCE_RTOL = 0.005  # largest relative distance of a peak from its solved point
+FEWEST_HALVED = 8  # smallest number of points of a contact that is halved: fewer would support it differently
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class StiffnessSlope:
     Attributes
     ----------
     amplitude
-        Relative change of the amplitude over that of the stiffness.
+        Relative change of the amplitude over the relative change of the stiffness.
     omega
         Change of the frequency over the relative change of the stiffness, rad/s; NaN at a fixed frequency.
     """
@@ -48,7 +49,7 @@ class StiffnessSlope:
 
 
 def stiffer(interface: Interface, factor: float) -> Interface:
-    """Return the same contacts with all their stiffnesses times a factor: friction, preloads and initial gaps stay.
+    """Return contacts with all stiffnesses times a factor; friction, preloads and initial gaps do not change.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def _stiffer(law: ContactLaw, factor: float) -> ContactLaw:
 def stiffness_slope(
     problem: ForcedProblem, point: ForcedPoint, output: int, *, resonance: bool
 ) -> StiffnessSlope | None:
-    """Return how a solved point, or the peak beside it, depends on the stiffness of all contacts.
+    """Return the sensitivity of a solved point, or of the peak near it, to the stiffness of all contacts.
 
     Parameters
     ----------
@@ -84,12 +85,12 @@ def stiffness_slope(
     output
         Number of the output.
     resonance
-        Whether to take the slope at the peak beside the point. Otherwise it is the slope at the frequency of the point.
+        Whether to evaluate at the peak near the point, instead of at the frequency of the point.
 
     Returns
     -------
     StiffnessSlope or None
-        None where contacts are rigid or none has a stiffness, or the Jacobian is singular.
+        None if contacts are rigid, no contact has a stiffness, or the Jacobian is singular.
     """
     balance = problem.balance(point.support)
     interface = problem.low.interface
@@ -148,7 +149,7 @@ def _by_stiffness(balance: HarmonicBalance, x: FloatArray, omega: float) -> Floa
 
 
 def _beside(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint) -> ForcedPoint | None:
-    """Return the solution at a frequency beside a point; None where none is found."""
+    """Return the solution at a frequency near a point; None without convergence."""
     omega = point.omega * (1.0 + APART)
     start = balance.unknowns(point.coefficients)
     found = newton(lambda x: balance.linearise(x, omega), start, problem.sweep.newton)
@@ -158,14 +159,14 @@ def _beside(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint
 
 
 def halved(system: System, groups: Sequence[str], position: FloatArray, area: FloatArray) -> tuple[System, int] | None:
-    """Return a system with half the points of its meshed contacts, and how many points are left out; None where none is meshed finely enough.
+    """Return a system with half the points of its meshed contacts, and the number of removed points; None if no contact has enough points.
 
     Parameters
     ----------
     system
-        With contacts on meshes.
+        System with contacts on meshes.
     groups
-        (p,) name of the contact of each point.
+        (p,) name of each point's contact.
     position
         (p, 3) positions, m.
     area
@@ -173,8 +174,8 @@ def halved(system: System, groups: Sequence[str], position: FloatArray, area: Fl
 
     Notes
     -----
-    A remaining point takes over the stuck stiffness of its removed neighbour. Its gap is the mean of both gaps, weighted by that
-    stiffness. The contact keeps its stiffness against displacements and its centre.
+    A remaining point takes over the stuck stiffness of its removed neighbour. Its gap is the mean of both gaps, weighted by their
+    stiffness. The contact keeps its total stiffness and its centre.
     """
     own = system.interface
     stiffness = own.stuck_stiffness().reshape(-1, 3).sum(axis=1)
@@ -201,7 +202,7 @@ def halved(system: System, groups: Sequence[str], position: FloatArray, area: Fl
 
 
 def _pairs(position: FloatArray) -> IntArray:
-    """Return the representative of each point: itself, or the nearest earlier point that represents itself alone."""
+    """Return the representative of each point: itself, or the nearest earlier point that represents only itself."""
     takes = np.arange(len(position))
     open_to = np.ones(len(position), dtype=bool)
     for i in range(len(position)):

@@ -41,7 +41,7 @@ def _exact_events() -> None:
 
 
 def _marched() -> None:
-    """March a law over a period, and along a path."""
+    """Evaluate a law over a period, and along a path."""
     contact_forces(_gaps(1), compile_contacts([SPRING], None, "march"), SAMPLES)
     forces_along(SPRING, np.zeros((2, 3)))
 
@@ -53,7 +53,7 @@ def _planar() -> None:
 
 
 def _on_samples() -> None:
-    """Evaluate contacts by intervals of the samples; march them in time."""
+    """Evaluate contacts in intervals between samples, and integrate them in time."""
     for n in (1, CONTACTS_WORTH_THREADS):
         contact_forces(_gaps(n), compile_contacts([SPRING] * n), SAMPLES)
     structure, gap, load = _problem()
@@ -82,10 +82,10 @@ def compile_ahead(workers: int) -> Iterator[tuple[str, int]]:
     Yields
     ------
     tuple
-        Name of each compiled part, and the number of those that are left.
+        Name of each compiled part, and the number of remaining parts.
     """
     left = len(LAWS) + len(TASKS)
-    for name in LAWS:  # compiled here, and not in each process
+    for name in LAWS:  # compiled once here instead of in each process
         _ = LAWS[name].kernel  # type: ignore[attr-defined]
         left -= 1
         yield f"contact law {name}", left
@@ -103,13 +103,13 @@ def _gaps(contacts: int) -> FloatArray:
 
 
 def _over_threads(law: ContactLaw) -> None:
-    """Evaluate so many contacts that threads share them."""
+    """Evaluate enough contacts to use several threads."""
     n = CONTACTS_WORTH_THREADS
     contact_forces(_gaps(n), compile_contacts([law] * n, None, "events"), 0, history=False)
 
 
 def _problem() -> tuple[Structure, FloatArray, HarmonicLoad]:
-    """Return a mass that moves in three directions, held by springs, its gaps and a load."""
+    """Return a mass on springs in three directions, its gaps and a load."""
     unit = np.eye(3)
     dofs = Dofs(np.arange(3), ("x", "y", "z"), np.zeros((3, 3)))
     load = HarmonicLoad(np.zeros(3), {1: np.ones(3, dtype=complex)})
@@ -117,7 +117,7 @@ def _problem() -> tuple[Structure, FloatArray, HarmonicLoad]:
 
 
 def _balanced(jacobian: JacobianForm) -> None:
-    """Put the equations of a small problem together, and solve with their Jacobian."""
+    """Assemble the equations of a small problem, and solve with their Jacobian."""
     structure, gap, load = _problem()
     interface = Interface(("contact",), (SPRING,), gap)
     linear = condense(structure, np.arange(3), load)

@@ -1,4 +1,4 @@
-"""Forced response with rigid contacts, by the dynamic Lagrangian method; contacts with a stiffness may stand beside them."""
+"""Forced response with rigid contacts, by the dynamic Lagrangian method; other contacts may have a stiffness."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from stickslip.solve.status import Status
 
 @dataclass(frozen=True, eq=False)
 class RigidPoint:
-    """A frequency of a response with rigid contacts.
+    """Point of a response with rigid contacts.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def rigid_response(
 ) -> Iterator[RigidPoint]:
     """Compute the forced response of a system with `RigidCoulomb` contacts over a frequency range, by arc length.
 
-    All harmonics are kept everywhere: there is no Jacobian Alert, because the force of a rigid contact is no function of its gap.
+    All harmonics are kept everywhere. There is no Jacobian Alert, because the force of a rigid contact is no function of its gap.
 
     Parameters
     ----------
@@ -70,20 +70,20 @@ def rigid_response(
     load
         Static and harmonic forces on all dofs, N.
     omega_range
-        First and last frequency, rad/s, in growing order; the same twice for one frequency.
+        Smallest and largest frequency, rad/s; twice the same for one frequency.
     points
-        Smallest number of points; more are taken where the response turns.
+        Smallest number of points; curved parts of the branch get more.
     discretisation
-        Harmonics, samples, solver. As many samples as coefficients, ``2 order + 1``, let the laws hold exactly at the samples; eight
-        a harmonic and more are more accurate.
+        Harmonics, samples, solver. With as many samples as coefficients, ``2 order + 1``, the laws hold exactly at the samples; eight or more
+        samples for each harmonic are more accurate.
     penalty
         Penalty of the method, N/m; see `dynamic_lagrangian`. It is no stiffness of the contacts.
 
     Yields
     ------
     RigidPoint
-        Points in the order of the branch, the last one at the end of the range. Where the branch cannot be followed, a point that did not
-        converge, and a new beginning a little further on.
+        Points in the order of the branch, the last one at the end of the range. Where the branch is lost, a point without convergence
+        follows, and a restart a little further on.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def rigid_response(
     if not 0.0 < first <= last < np.inf:
         raise input_error("omega_range", f"goes from {first:g} to {last:g} rad/s", "Give 0 < first <= last.")
     how = discretisation or Discretisation()
-    # where contacts stick throughout, their coordinates are zero and no measure of a step
+    # coordinates of permanently sticking contacts are zero and cannot measure a step
     linear = system.condensed(load, how.order, system.outputs)
     problem = dynamic_lagrangian(linear, system.interface, how.order, how.samples, penalty, how.evaluator)
     for found in plain_sweep(system, problem, omega_range, points, how.newton):

@@ -1,4 +1,4 @@
-"""A structure with its contacts, the input of every analysis."""
+"""Structure with its contacts, the input of every analysis."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A reduced structure, its contacts, and the dofs that are solved for and reported.
+    """Reduced structure, its contacts, and the retained and reported dofs.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ class System:
     outputs
         Dof indices whose motion is reported.
     alert_dofs
-        Dofs over which the predicted error of the harmonics is taken: outputs, contact dofs, chosen directions; None: the outputs.
+        Dofs of the predicted harmonic error: outputs, contact dofs or chosen directions; None: the outputs.
     free
-        Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
+        Dofs of rigid bodies held by contacts only; they are retained with or without a contact.
     peak_of
-        Positions of the outputs whose largest amplitude is that of the response, such as all blades; None: the first output.
+        Positions of the outputs whose largest amplitude defines the response, such as all blades; None: the first output.
     """
 
     structure: LinearSide
@@ -66,16 +66,16 @@ class System:
 
     @property
     def retained(self) -> IntArray:
-        """Dofs that stay unknown: those of the contacts, of free bodies and of constraints, sorted; outputs beside rigid contacts."""
+        """Sorted unknown dofs: of contacts, free bodies and constraints; with rigid contacts also the outputs."""
         free = NO_DOFS if self.free is None else self.free
         held = np.union1d(free, self.structure.multipliers).astype(np.int64)
-        if self.interface.rigid:  # where all of them stick, contacts are no measure of a motion
+        if self.interface.rigid:  # if all of them stick, contacts cannot measure a motion
             held = np.union1d(held, self.outputs)
         return np.union1d(self.interface.coordinates(), held)
 
     @property
     def springs(self) -> Interface:
-        """The contacts with stiff springs in place of rigid ones: for static states and small vibrations."""
+        """Contacts with stiff springs in place of rigid contacts, for static states and small vibrations."""
         if not self.interface.rigid:
             return self.interface
         stiffness = np.abs(self.structure.of_harmonic(0).stiffness.diagonal())
@@ -88,14 +88,14 @@ class System:
         return tuple(labels[i] for i in self.retained)
 
     def at(self, omega: float) -> "System":
-        """Return the system at a frequency, rad/s. It changes only along an engine-order line, with the speed."""
+        """Return the system at a frequency, rad/s; it depends on the frequency only along an engine-order line."""
         side = self.structure.at_frequency(omega)
         return self if side is self.structure else replace(self, structure=side)
 
     def condensed(self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS) -> DynamicStiffness:
         """Return structure and load condensed to the retained dofs and `more`, for harmonics up to `order`.
 
-        On a wheel it includes the waves of the judging set, where the wheel has them.
+        For a wheel the harmonics of the judging set are included, if the wheel has their waves.
         """
         side, retained = self.structure, np.union1d(self.retained, more)
         order = max(order, min(JUDGED_MULTIPLE * order, side.harmonics or 0))
@@ -103,14 +103,14 @@ class System:
 
     @property
     def plain_structure(self) -> Structure:
-        """Structure that is the same in all harmonics; see `one_structure`."""
+        """Structure with the same matrices in all harmonics; see `one_structure`."""
         return one_structure(self.structure, "this analysis")
 
     def with_retention(self, stiffness: float) -> "System":
         """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
 
-        Rotational dofs get the stiffness times the inertia tensor over the mass of the body, so that one number serves all six and the
-        spring turns with the body.
+        Rotational dofs get the stiffness times the inertia tensor over the mass of the body, so that one number serves all six dofs in any
+        orientation of the body.
         """
         if self.free is None or stiffness == 0.0:
             return self
@@ -136,7 +136,7 @@ class System:
 
 
 def _dofs(name: str, given: IntArray, n: int) -> IntArray:
-    """Return indices of dofs as an array, after checking that they are some."""
+    """Return dof indices as an array, after checking them."""
     index = np.asarray(given)
     if index.size and index.dtype.kind not in "iu":
         raise input_error(f"System.{name}", f"holds {index.reshape(-1)[0]!r}, which is no index", "Give whole numbers.")

@@ -1,6 +1,6 @@
-"""Check of the harmonics: prediction from a solution to a judging set (Gastaldi & Berruti 2017, section 6).
+"""Check of the harmonics: predicted change of a solution with a judging set of harmonics (Gastaldi & Berruti 2017, section 6).
 
-The contribution of each missing harmonic to the outputs is the term by which `GoalOriented` chooses.
+The contribution of each missing harmonic to the outputs is the criterion of `GoalOriented`.
 """
 
 from collections.abc import Sequence
@@ -28,9 +28,9 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_s
 from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import newton
 
-MAX_ROWS = 2000  # of a system that is solved where two steps say different things,
-MAX_ITERATIONS = 15  # of Newton's method there
-SAME_RTOL = 0.02  # difference of what two steps say, with which they say the same
+MAX_ROWS = 2000  # largest system that is solved if two predictions differ,
+MAX_ITERATIONS = 15  # and its largest number of Newton iterations
+SAME_RTOL = 0.02  # relative difference up to which two predictions agree
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +42,15 @@ class SupportCheck:
     omega
         Frequency, rad/s.
     kept, harmonics
-        Harmonics of the point, and those of the comparison.
+        Harmonics of the point and of the comparison.
     error
-        Predicted relative change, a fraction; infinite where the enlarged Jacobian is singular.
+        Predicted relative change, a fraction; infinite if the enlarged Jacobian is singular.
     harmonic
-        The harmonic with that change.
+        The harmonic with this change.
     dof, label
-        The dof with that change, and its name.
+        The dof with this change, and its name.
     seconds_contact
-        Time of the contact evaluations.
+        Time of the contact evaluations, s.
     """
 
     omega: float
@@ -67,19 +67,19 @@ class SupportCheck:
 def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor: int = 2) -> tuple[SupportCheck, ...]:
     """Predict the change of every solved point by all harmonics up to a multiple of the reference order, and by its judging set.
 
-    Two Newton steps a point: two contact evaluations and two linear solutions. The first keeps the contact states of the point; the second asks the
-    contacts where the first leads. Where it changes what is predicted by more than a fiftieth, the motion is solved with these harmonics (up to `MAX_ROWS`); where that
-    fails, the second step is a warning and no bound, as a rule too large. Harmonics that the reference leaves out, such as the even ones, are among those that it is held against.
+    Each point takes two Newton steps: two contact evaluations and two linear solutions. The first step keeps the contact states of the point;
+    the second uses the states after the first. If the two predictions differ by more than 2 %, the motion is solved with these harmonics (up to
+    `MAX_ROWS`). If this fails, the second prediction serves as a warning, which is usually too large and is no bound. Harmonics that the
+    reference omits, such as even ones, are part of the comparison.
 
     Parameters
     ----------
     problem
         The forced response (`forced_problem`).
     points
-        Points of the response (`accepted_points`), with the reference support or fewer harmonics; those without a solution
-        are passed over.
+        Points of the response (`accepted_points`) with the reference harmonics or fewer; points that did not converge are skipped.
     factor
-        Highest harmonic of the check over that of the reference, at least 2.
+        Highest harmonic of the check over the highest of the reference, at least 2.
 
     Returns
     -------
@@ -102,9 +102,9 @@ def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor:
 
 
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the predicted relative change of a solution by its judging set: the estimate from the continuation, otherwise from Newton steps.
+    """Return the predicted relative change of a solution by its judging set, from the continuation or from Newton steps.
 
-    For a motion found by shooting it is the estimated error of the time step.
+    For a motion found by shooting, return the estimated error of the time step.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
         return float("nan")
     if point.shot:
         return point.shot[0].error
-    # in the published passages a strategy looks at nothing beyond its reference
+    # in the published passages, a strategy ignores harmonics beyond its reference
     fed = judging_set(point.support, problem.driven)
     looked = problem.sweep.auto or set(fed) <= set(problem.high.harmonics)
     if problem.strategy.verifies and looked and not np.isnan(point.predicted_error):
@@ -135,20 +135,20 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _predicted(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Predict by Newton steps the relative change of a solution by the harmonics of its judging set; see `own_error`."""
+    """Predict the relative change of a solution by its judging set with Newton steps; see `own_error`."""
     own = with_stiffness(problem.balance(point.support))
     x = own.unknowns(point.coefficients)
     wide = with_waves(problem, own, judging_set_of(own)[-1])
     more = judging_balance(wide, ringing(wide, x, point.omega))
     if more.harmonics == own.harmonics:
-        return float("nan")  # the wheel has no more waves
+        return float("nan")  # the wheel has no further waves
     found = _led_on(problem, own, more, x, point.omega)
     known = covers(own, more) and point.by_dof is None
     return found.error if known else max(found.error, UNSEEN)
 
 
 def _led_on(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float) -> Alert:
-    """Return the error predicted by two Newton steps with more harmonics; where they disagree, Newton's method continues."""
+    """Return the error predicted by two Newton steps with more harmonics; if they disagree, solve with Newton's method."""
     first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
     second = asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
     if abs(second.error - first.error) <= SAME_RTOL * second.error or high.size > MAX_ROWS:
@@ -161,20 +161,23 @@ def _led_on(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance,
 
 
 def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> HarmonicBalance:
-    """Return a problem condensed for harmonics up to `top`, if the wheel has the waves; else the problem itself."""
+    """Return a problem condensed for harmonics up to `top` if the wheel has the waves, otherwise the problem itself."""
     most = own.linear.most
     if most is None or most >= top:
         return own
     try:
         wide = problem.system.condensed(own.linear.load, top)
-        known = wide.most  # along an engine-order line the waves are condensed when first asked for
+        known = wide.most  # along an engine-order line, waves are condensed when first needed
     except InputError:
         return own
     return replace(own, linear=wide) if known is None or known > most else own
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `factor` times the reference order and its judging set (limited by the waves of a wheel), with enough samples."""
+    """Return the problem with all harmonics up to `factor` times the reference order, its judging set, and enough samples.
+
+    The waves of a wheel limit the judging set.
+    """
     high = with_stiffness(problem.high)
     wanted, fed = harmonics_of(factor * high.order), judging_set_of(high)
     most = with_waves(problem, high, max(wanted[-1], fed[-1])).linear.most
@@ -202,24 +205,24 @@ def _check(problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint
 
 @dataclass(frozen=True, eq=False)
 class HarmonicContributions:
-    """Relative changes of outputs by the harmonics that a solution lacks, one row an output and one column a harmonic.
+    """Relative changes of outputs by missing harmonics, with one row for each output and one column for each harmonic.
 
     Attributes
     ----------
     omega
         Frequency, rad/s.
     kept, missing
-        Harmonics of the point, and those of the reference that it lacks.
+        Harmonics of the point, and missing harmonics of the reference.
     harmonics, dofs
-        (k,) what the outputs are: a harmonic of a dof each; those that hardly move are left out.
+        (k,) harmonic and dof of each output; outputs that hardly move are omitted.
     labels
         k names of the dofs.
     parts
-        (k, n_missing) change of the output by each missing harmonic over the output itself: the real part is, to first order,
-        the relative change of the amplitude, the imaginary part that of the phase in rad. The sum over a row is the estimated
-        change. Infinite where the Jacobian is singular.
+        (k, n_missing) relative change of the output by each missing harmonic: to first order, the real part is the relative change of the
+        amplitude, and the imaginary part the change of the phase, rad. The sum over a row is the estimated change. Infinite if the
+        Jacobian is singular.
     bound
-        Largest relative change that is to be expected of any output; never below the prediction of the Jacobian Alert.
+        Largest expected relative change of any output, at least the prediction of the Jacobian Alert.
     """
 
     omega: float
@@ -235,13 +238,13 @@ class HarmonicContributions:
 def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goal = "motion") -> HarmonicContributions:
     """Estimate the change of the outputs at a solved point by each missing harmonic of the reference.
 
-    Residuals of the missing harmonics weighted by the adjoints of the outputs (Becker & Rannacher 2001, section 2), with the
-    mean Jacobian of two or three evaluations with all harmonics; nothing is iterated.
+    The residuals of the missing harmonics are weighted by the adjoints of the outputs (Becker & Rannacher 2001, section 2), with the mean
+    Jacobian of two or three evaluations with all harmonics and without iteration.
 
     Parameters
     ----------
     problem
-        The forced response (`forced_problem`); its reference harmonics are those of ``Sweep.high``.
+        The forced response (`forced_problem`) with the reference harmonics of ``Sweep.high``.
     point
         A converged point of the response.
     goal
@@ -250,7 +253,7 @@ def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goa
     Returns
     -------
     HarmonicContributions
-        Without columns where the point has all harmonics of the reference.
+        Contributions; no columns if the point has all harmonics of the reference.
 
     Raises
     ------

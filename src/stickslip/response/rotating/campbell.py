@@ -1,4 +1,4 @@
-"""Campbell diagram: natural frequencies against rotor speed, followed by mode shape, and where engine orders meet them."""
+"""Campbell diagram: natural frequencies over rotor speed, tracked by mode shape, and their crossings with engine orders."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,9 +16,9 @@ from stickslip.units import HZ
 
 CLEAR = 0.7  # modal assurance below which a step in speed is halved
 HALVINGS = 5  # of a step: a veering narrower than a thirtieth of it counts as a crossing
-SPARE = 4  # modes beyond those followed, so that one that rises among them can leave
-NEARNESS = 1e-3  # weight of a relative step in frequency beside the assurance: it decides where shapes do not
-# relative distance of frequencies whose shapes are one space: equal blades, a wheel's pairs
+SPARE = 4  # additional modes, so that a tracked mode may leave the lowest ones
+NEARNESS = 1e-3  # weight of a relative step in frequency against the assurance: it decides between equal shapes
+# relative distance up to which frequencies are equal and their shapes span a space: equal blades, pairs of a wheel
 EQUAL_FREQUENCY_RTOL = 1e-6
 
 StructureAt = Callable[[float], Structure]
@@ -26,7 +26,7 @@ StructureAt = Callable[[float], Structure]
 
 @dataclass(frozen=True)
 class Crossing:
-    """A speed at which an engine order meets a natural frequency.
+    """Speed at which an engine order meets a natural frequency.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Crossing:
     mode
         Column of `Campbell.frequencies_hz`, from 0.
     speed
-        In rad/s.
+        Rotor speed, rad/s.
     frequency_hz
         ``engine_order * speed / (2π)``.
     """
@@ -48,21 +48,21 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Campbell:
-    """Natural frequencies against speed, each column one mode followed by its shape.
+    """Natural frequencies over speed; each column is a mode tracked by its shape.
 
     Parameters
     ----------
     speeds
-        (s,) in rad/s, ascending.
+        (s,) ascending rotor speeds, rad/s.
     frequencies_hz
         (s, n_modes) in the rotating frame; columns in the order of the first speed. Negative where a motion diverges instead of
         vibrating.
     agreement
-        (s, n_modes) least modal assurance (1: same shape) on the way from the speed before; ones at the first.
+        (s, n_modes) smallest modal assurance (1: same shape) since the previous speed; ones at the first speed.
     engine_orders
-        Engine orders whose crossings were searched.
+        Engine orders of the crossings.
     crossings
-        By engine order, then by speed.
+        Crossings by engine order, then by speed.
     wave_number, sectors
         Wave number of the structure and number of sectors; 0 and 1 for a structure that is not cyclic.
     """
@@ -77,14 +77,14 @@ class Campbell:
 
     @property
     def nodal_diameter(self) -> int:
-        """Number of nodal diameters, between 0 and half the number of sectors."""
+        """Nodal diameter, between 0 and half the number of sectors."""
         return min(self.wave_number, self.sectors - self.wave_number)
 
     @property
     def stationary_hz(self) -> FloatArray:
-        """(s, n_modes) seen by an observer who does not rotate: ``f - kΩ/2π`` for backward waves, ``f + kΩ/2π`` for forward ones.
+        """(s, n_modes) frequencies in the stationary frame, Hz: ``|f - kΩ/2π|`` for backward waves, ``f + kΩ/2π`` for forward ones.
 
-        Magnitudes; a backward wave that rotation overtakes runs forward to the observer.
+        A backward wave slower than the rotation runs forward in this frame.
         """
         k = self.wave_number if 2 * self.wave_number <= self.sectors else self.wave_number - self.sectors
         return np.abs(self.frequencies_hz - k * self.speeds[:, None] / HZ)
@@ -101,7 +101,7 @@ class _Spectrum:
     speed: float
     hertz: FloatArray  # (c,)
     shapes: FloatArray | ComplexArray  # (n, c)
-    weighted: FloatArray | ComplexArray  # (n, c), the same times the mass
+    weighted: FloatArray | ComplexArray  # (n, c), shapes times the mass
     agreement: FloatArray  # (c,)
 
     def take(self, index: IntArray, agreement: FloatArray) -> "_Spectrum":
@@ -110,7 +110,7 @@ class _Spectrum:
 
 @dataclass(eq=False)
 class _Speeds:
-    """Spectra of one family of structures, each computed once."""
+    """Spectra of a structure over speed, each computed once."""
 
     structure_at: StructureAt
     n_modes: int
@@ -123,7 +123,7 @@ class _Speeds:
         return self.known[speed]
 
     def forget(self, below: float) -> None:
-        """Drop what lies below a speed: shapes of large models take much memory."""
+        """Drop spectra below a speed: shapes of large models take much memory."""
         for speed in [s for s in self.known if s < below]:
             del self.known[speed]
 
@@ -138,36 +138,36 @@ def campbell(
     tolerance: float = 1e-6,
     progress: Callable[[float], None] | None = None,
 ) -> Campbell:
-    """Follow the lowest modes of a structure through a range of speeds and find the crossings with engine orders.
+    """Track the lowest modes of a structure over rotor speed and find their crossings with engine orders.
 
     Parameters
     ----------
     structure_at
-        Speed in rad/s -> structure in the rotating frame, with centrifugal stiffening and spin softening as they matter. Coordinates
-        must be the same at all speeds, or the structures must lead back to the same full model.
+        Function of the speed, rad/s, that returns the structure in the rotating frame, with centrifugal stiffening and spin softening
+        where they matter. Coordinates must be the same at all speeds, or the structures must expand to the same full model.
     speeds
-        Ascending, in rad/s; a crossing is found where the frequency minus the engine order's changes its sign from one to the next.
+        Ascending speeds, rad/s. A crossing is found if the sign of frequency minus engine-order frequency changes from one to the next.
     n_modes
         Number of modes, counted at the first speed.
     engine_orders
-        Positive.
+        Positive engine orders.
     coriolis
-        Whether the skew part of the structure's damping counts (`gyroscopic_modes`). Dissipation never does.
+        Whether to include the skew part of the structure's damping (`gyroscopic_modes`). Dissipation is never included.
     tolerance
         Relative tolerance of the speed of a crossing.
     progress
-        Called with each speed when it is done.
+        Function called with each finished speed.
 
     Returns
     -------
     Campbell
-        A step over which a shape changes much, or two modes change places, is halved up to five times: modes that veer apart keep
-        their places, modes that cross keep their shapes. What is left of doubt stands in `agreement`.
+        A step with a large change of a shape, or with an exchange of two modes, is halved up to five times: veering modes keep their
+        order, crossing modes keep their shapes. `agreement` shows the remaining doubt.
 
     Raises
     ------
     InputError
-        If speeds do not ascend, or numbers do not make sense.
+        If speeds do not ascend, or a number is invalid.
     """
     speeds = _checked(speeds, n_modes, engine_orders)
     family = _Speeds(structure_at, n_modes, coriolis)
@@ -229,7 +229,7 @@ def _spectrum(structure: Structure, speed: float, n_modes: int, coriolis: bool) 
     else:
         at_rest = normal_modes(structure, count)
         hertz, shapes = at_rest.frequencies_hz, at_rest.shapes
-    # reduced coordinates need not mean the same at two speeds, those of the full model do
+    # reduced coordinates may differ between two speeds, coordinates of the full model do not
     whole = structure.expand(shapes)
     weighted = structure.mass @ shapes if structure.basis is None else whole
     return _Spectrum(speed, hertz, whole, weighted, np.ones(hertz.size))
@@ -249,13 +249,13 @@ def _assurance(before: _Spectrum, after: _Spectrum) -> FloatArray:
 
 
 def _matched(before: _Spectrum, after: _Spectrum) -> _Spectrum:
-    """Return those of the modes `after` that continue those `before`, in their order."""
+    """Return the modes `after` that continue the modes `before`, in the same order."""
     assurance = _assurance(before, after)
     distance = np.abs(before.hertz[:, None] - after.hertz)
     total = np.abs(before.hertz[:, None]) + np.abs(after.hertz)
     step = distance / np.where(total > 0.0, total, 1.0)
     _, chosen = scipy.optimize.linear_sum_assignment(NEARNESS * step - assurance)
-    # within a space of equal frequencies shapes are free: what counts is their share in the whole of it
+    # shapes of equal frequencies are arbitrary within their space: the share in the whole space counts
     spread = np.sum(assurance * _equal(after.hertz[chosen], after.hertz), axis=1)
     gathered = np.diagonal(_equal(before.hertz, before.hertz) @ assurance[:, chosen])
     return after.take(chosen, np.minimum(np.maximum(spread, gathered), 1.0))
@@ -266,7 +266,7 @@ def _equal(one: FloatArray, other: FloatArray) -> BoolArray:
 
 
 def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> _Spectrum:
-    """Return the modes `before` at another speed, by way of speeds between where shapes or the order of modes change."""
+    """Track the modes `before` to another speed, with intermediate speeds where shapes or the order of modes change."""
     matched = _matched(before, family.at(speed))
     clear = np.all(matched.agreement >= CLEAR) and not _exchanged(before.hertz, matched.hertz)
     if halvings == 0 or clear:
@@ -278,13 +278,13 @@ def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> 
 
 
 def _exchanged(before: FloatArray, after: FloatArray) -> bool:
-    """Whether two modes seem to have crossed: a veering would look the same from afar."""
+    """Whether two modes seem to have crossed: with a long step, a veering looks the same."""
     gaps = [np.where(_equal(f, f), 0.0, f[:, None] - f) for f in (before, after)]
     return bool(np.any(gaps[0] * gaps[1] < 0.0))
 
 
 def _crossings_at(here: _Spectrum, engine_orders: Sequence[int]) -> list[Crossing]:
-    """Return the crossings that happen to lie on the first speed."""
+    """Return the crossings exactly at the first speed."""
     return [
         Crossing(int(order), int(mode), here.speed, float(here.hertz[mode]))
         for order in engine_orders
@@ -313,7 +313,7 @@ def _crossing_speed(
         followed = _follow(family, before, speed, HALVINGS)
         return float(followed.hertz[mode] - order * speed / (2 * math.pi))
 
-    # relative to the crossing, which may lie far below the interval's end
+    # relative to the crossing, which may lie far below the end of the interval
     least = float(np.finfo(float).eps)
     rtol, xtol = max(tolerance, 4 * least), least * after.speed
     return float(scipy.optimize.brentq(distance, before.speed, after.speed, xtol=xtol, rtol=rtol))

@@ -1,4 +1,4 @@
-"""Campbell diagrams of a wheel, one a travelling wave: an engine order meets the modes of the wave that it excites."""
+"""Campbell diagrams of a wheel, one for each travelling wave: an engine order meets only modes of the wave that it excites."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -23,30 +23,30 @@ def cyclic_campbell(
     tolerance: float = 1e-6,
     progress: Callable[[int, float], None] | None = None,
 ) -> tuple[Campbell, ...]:
-    """Follow the modes of a wheel through a range of speeds, wave by wave.
+    """Track the modes of a wheel over rotor speed, wave by wave.
 
     Parameters
     ----------
     sector_at
-        Speed in rad/s -> sector. It is called for each wave and speed: let it remember what is costly.
+        Function of the speed, rad/s, that returns the sector. It is called for each wave and speed, so it should cache expensive results.
     speeds
-        Ascending, rad/s.
+        Ascending speeds, rad/s.
     n_modes
-        Modes of each wave.
+        Number of modes of each wave.
     engine_orders
-        Positive. On n_s equal sectors engine order m excites wave number ``m mod n_s``, and has crossings in that diagram alone.
+        Positive engine orders. On n_s equal sectors, engine order m excites wave number ``m mod n_s`` and has crossings in its diagram only.
     wave_numbers
-        Of the diagrams; those that the engine orders excite if not given. Without Coriolis forces waves k and n_s - k have the same
-        frequencies, and one diagram, of the smaller number.
+        Wave numbers of the diagrams; None: the ones excited by the engine orders. Without Coriolis forces, waves k and n_s - k have the same
+        frequencies and one diagram, with the smaller number.
     coriolis, tolerance
-        As of `campbell`.
+        As in `campbell`.
     progress
-        Called with wave number and speed.
+        Function called with wave number and speed.
 
     Returns
     -------
     tuple of Campbell
-        By wave number.
+        Diagrams by wave number.
 
     Raises
     ------

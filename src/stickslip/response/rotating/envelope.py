@@ -1,4 +1,4 @@
-"""Fast run-up: the slowly varying amplitudes of a vibration whose frequency is swept, a pseudo-travelling wave on a wheel.
+"""Fast run-up: slowly varying amplitudes of a vibration with swept frequency, on a wheel a pseudo-travelling wave.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, end of appendix 1.
@@ -23,26 +23,26 @@ from stickslip.response.continuation.starting_solutions import without_branch
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 
-FIRST, SMALLEST, LARGEST = 1e-4, 1e-9, 1 / 150  # steps, as shares of the time of the sweep
-# of the difference from the prediction, that is the error of a step: 2/11 with equal steps
+FIRST, SMALLEST, LARGEST = 1e-4, 1e-9, 1 / 150  # steps over the duration of the sweep
+# error of a step over its difference from the prediction: 2/11 with equal steps
 SHARE = 0.2
 GROWTH, SHRINK, SAFE = 2.0, 0.3, 0.85
 
 
 @dataclass(frozen=True, eq=False)
 class EnvelopePoint:
-    """A moment of a sweep.
+    """State at one time of a sweep.
 
     Attributes
     ----------
     time
-        Since the beginning of the sweep, s.
+        Time since the beginning of the sweep, s.
     omega
-        Momentary frequency, rad/s.
+        Instantaneous frequency, rad/s.
     coefficients
         (H+1, n) complex amplitudes of all coordinates, m: ``u(t) = Re Σ Q_h(t) exp(i h φ(t))`` with ``dφ/dt = omega``.
     converged
-        Whether the step was solved; a sweep ends with one that was not.
+        Whether the step was solved; a failed step ends the sweep.
     """
 
     time: float
@@ -53,20 +53,20 @@ class EnvelopePoint:
 
 @dataclass(frozen=True, kw_only=True)
 class SweepInTime:
-    """How a sweep is computed.
+    """Options of a sweep in time.
 
     Parameters
     ----------
     ends
         First and last frequency, rad/s; the last may be the lower one.
     rate
-        Change of the frequency in a second, above zero, rad/s².
+        Sweep rate, above zero, rad/s².
     harmonics
-        Highest harmonic, or those kept.
+        Highest harmonic, or the kept harmonics.
     samples, evaluator
-        As of `Sweep`.
+        As in `Sweep`.
     tolerance
-        Error of a step, as a share of the largest amplitude so far.
+        Error of a step, relative to the largest amplitude so far.
     """
 
     ends: tuple[float, float]
@@ -86,7 +86,7 @@ class SweepInTime:
 
     @property
     def seconds(self) -> float:
-        """Time of the whole sweep."""
+        """Duration of the sweep, s."""
         return abs(self.ends[1] - self.ends[0]) / self.rate
 
     def omega(self, time: float) -> float:
@@ -95,26 +95,26 @@ class SweepInTime:
 
     @property
     def signed_rate(self) -> float:
-        """Change of the frequency in a second, rad/s²; negative for a falling one."""
+        """Sweep rate, rad/s²; negative for falling frequencies."""
         return float(np.copysign(self.rate, self.ends[1] - self.ends[0]))
 
 
 def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator[EnvelopePoint]:
-    """Follow the amplitudes of all harmonics while the frequency is swept at a constant rate.
+    """Compute the amplitudes of all harmonics while the frequency is swept at a constant rate.
 
-    For each harmonic above the static one
+    Each harmonic above the static one obeys
 
         (2ihω M + C) dQ_h/dt + (Z_h(ω) + i h dω/dt M) Q_h + F_c,h(Q) = F_h ,
 
-    the equation of motion without the second derivative of the amplitude. With it there would be motions ``exp(-2iωt)``, which run the
-    other way and which the contact forces of the momentary amplitudes would drive. The static term follows without delay. Contact
-    forces are those of the periodic motion with the momentary amplitudes. Steps are those of the second backward difference formula,
-    their length follows from the difference between prediction and solution.
+    the equation of motion without the second derivative of the amplitude, which would add spurious motions ``exp(-2iωt)`` driven by the
+    contact forces. The static term follows without delay. Contact forces are computed for the periodic motion with the instantaneous
+    amplitudes. Steps use the second-order backward difference formula, with a length controlled by the difference between prediction and
+    solution.
 
     Parameters
     ----------
     system
-        Structure or wheel, or an engine-order line of it: then matrices and static load are those of the momentary speed.
+        Structure or wheel. On an engine-order line, matrices and static load follow the instantaneous speed.
     load
         Static and harmonic forces, N.
     sweep
@@ -123,12 +123,12 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
     Yields
     ------
     EnvelopePoint
-        The steady motion at the first frequency, then a point a step. If a step cannot be solved, one that did not converge is the last.
+        The steady motion at the first frequency, then one point for each step. If a step fails, the last point is not converged.
 
     Raises
     ------
     InputError
-        If the contacts are rigid, or a load drives a harmonic that is not kept.
+        If contacts are rigid, or the load drives a harmonic that is not kept.
     """
     if system.interface.rigid:
         raise input_error("envelope", "needs contact forces that follow from gaps", "Give the contacts a stiffness.")
@@ -157,7 +157,7 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
 
 
 def _longer(error: float) -> float:
-    """Return the factor on the step length after a step with an error, given as a share of the allowed one; infinite if it was not solved."""
+    """Return the factor on the step length; `error` is the error of the step over the allowed one, infinite for a failed step."""
     if np.isinf(error):
         return SHRINK
     share = SAFE * max(error, 1e-12) ** (-1 / 3)
@@ -174,7 +174,7 @@ class _Step:
 
 @dataclass(frozen=True, eq=False)
 class _Flow:
-    """The slow flow: a step is a balance on the retained coordinates, the others are condensed at each."""
+    """Slow flow: each step solves a balance on the retained coordinates, with the others condensed."""
 
     system: System
     balance: HarmonicBalance
@@ -182,18 +182,18 @@ class _Flow:
     moving: IntArray  # coordinates that are displacements
 
     def at(self, omega: float) -> HarmonicBalance:
-        """Return the balance at a frequency, its matrices those of the speed alone."""
+        """Return the balance at a frequency; on an engine-order line with the matrices of its speed."""
         linear = self.balance.linear
         if isinstance(linear, TurningStiffness):
             return replace(self.balance, linear=linear.at(omega))
         return self.balance
 
     def size(self, q: ComplexArray) -> float:
-        """Return how large a vibration is, m; the static part does not count."""
+        """Return the norm of the vibration, m, without the static part."""
         return float(np.linalg.norm(q[1:, self.moving]))
 
     def step(self, points: list[_Step], step: float) -> ComplexArray | None:
-        """Return the amplitudes a step ahead; None where none were found."""
+        """Return the amplitudes after a step; None without convergence."""
         omega = self.sweep.omega(points[-1].time + step)
         now, known = _derivative(points, step)
         small = self._condensed(omega, now, known)
@@ -240,7 +240,7 @@ class _Flow:
 
 @dataclass(frozen=True, eq=False)
 class _Condensed:
-    """Equations ``S q = g`` of the retained coordinates of harmonics 0 to H, and the way back to all: ``own - through q``."""
+    """Equations ``S q = g`` of the retained coordinates of harmonics 0 to H, and recovery ``own - through q`` of the others."""
 
     stiffness: ComplexArray  # (H+1, r, r)
     load: ComplexArray  # (H+1, r)
@@ -267,7 +267,7 @@ class _Condensed:
 
     @classmethod
     def of(cls, parts: list["_Condensed"]) -> "_Condensed":
-        """Put harmonics together."""
+        """Stack the harmonics."""
         return cls(
             np.array([part.stiffness for part in parts]),
             np.array([part.load for part in parts]),
@@ -278,7 +278,7 @@ class _Condensed:
         )
 
     def spread(self, q: ComplexArray) -> ComplexArray:
-        """Return the amplitudes (H+1, n) of all coordinates from those of the retained ones."""
+        """Return the amplitudes (H+1, n) of all coordinates from the retained ones."""
         out = np.empty((len(q), self.near.size + self.far.size), dtype=complex)
         out[:, self.near] = q
         out[:, self.far] = self.own - np.einsum("hij,hj->hi", self.through, q)
@@ -294,7 +294,7 @@ def _flow(system: System, load: HarmonicLoad, sweep: SweepInTime) -> _Flow:
 
 
 def _derivative(points: list[_Step], step: float) -> tuple[float, ComplexArray]:
-    """Return the factor of the new amplitudes in their derivative, and the rest of it: the second backward difference formula."""
+    """Return the second-order backward difference of amplitudes: the factor of the new ones, and the sum of the known terms."""
     last = points[-1]
     if len(points) < 2:
         return 1.0 / step, -last.q / step
@@ -304,7 +304,7 @@ def _derivative(points: list[_Step], step: float) -> tuple[float, ComplexArray]:
 
 
 def _ahead(points: list[_Step], step: float) -> ComplexArray:
-    """Return the polynomial through up to three last points, a step ahead."""
+    """Extrapolate the polynomial through the last points, at most three, by a step."""
     time = points[-1].time + step
     found = np.zeros_like(points[-1].q)
     for one in points:

@@ -1,7 +1,7 @@
-"""Flutter of one wave: aerodynamic damping by the energy method and by eigenvalues, beside each other.
+"""Flutter of one wave: aerodynamic damping by the energy method and by eigenvalues.
 
-The wave is written in its lowest undamped modes. The energy method takes each mode as it is in still fluid and the work of the fluid on
-it in a period; the eigenvalues are those of the modes together, with coefficients at the frequency of the motion itself.
+The wave is reduced to its lowest undamped modes. The energy method uses the modes in still fluid and the work of the fluid on each in a
+period. The eigenvalue method couples all modes, with coefficients at the frequency of the motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,28 +15,28 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback, InfluenceCoefficients
 
-SPARE = 6  # modes beyond those asked for, with which the fluid may couple them
-TAKES_PART = 1e-9  # of the largest amplitude of a pattern: below, a mode does not feel the fluid
+SPARE = 6  # additional modes, which the fluid may couple with the requested ones
+TAKES_PART = 1e-9  # pattern amplitude of a mode over the largest, below which the fluid does not act on it
 ITERATIONS = 60
-SETTLED = 1e-12  # relative change of an eigenvalue
+SETTLED = 1e-12  # relative change of an eigenvalue that ends the iteration
 
 
 @dataclass(frozen=True, eq=False)
 class FlutterOfWave:
-    """Modes of a wave in the flow, lowest frequency in still fluid first.
+    """Modes of a wave in the flow, by ascending frequency in still fluid.
 
     Parameters
     ----------
     frequencies
-        (n,) in still fluid, rad/s.
+        (n,) frequencies in still fluid, rad/s.
     amplitudes
-        (n, m) of the patterns in each mode of unit mass: ``Pᴴ φ``.
+        (n, m) amplitudes of the patterns in each mode of unit mass: ``Pᴴ φ``.
     by_energy
         (n,) aerodynamic damping ratio ``ζ = −W/(4πE)``.
     in_flow
-        (n,) eigenvalues with the fluid and without the structure's own damping, 1/s.
+        (n,) eigenvalues with the fluid and without structural dissipation, 1/s.
     damped
-        (n,) eigenvalues with both, 1/s.
+        (n,) eigenvalues with the fluid and structural dissipation, 1/s.
     """
 
     frequencies: FloatArray
@@ -52,7 +52,7 @@ class FlutterOfWave:
 
     @property
     def total(self) -> FloatArray:
-        """(n,) damping ratio with that of the structure."""
+        """(n,) damping ratio of fluid and structure together."""
         return damping_ratio(self.damped)
 
 
@@ -69,23 +69,23 @@ def flutter_of_wave(
     Parameters
     ----------
     structure
-        The wave without the fluid: its damping, Coriolis terms (the skew part) and structural damping count.
+        The wave without the fluid: its damping, Coriolis terms (the skew part) and structural damping are included.
     feedback
-        The aerodynamic force, in coordinates of the wave.
+        Aerodynamic force, in coordinates of the wave.
     n_modes
         Number of modes.
     ratios
-        Damping ratios of the modes, lowest first, beside the structure's matrices; one number: of all.
+        Additional damping ratios of the modes, lowest first, or one for all.
 
     Raises
     ------
     InputError
-        If the wave has fewer modes, a mode does not vibrate, or its frequency is outside of the coefficients' table.
+        If the wave has fewer modes, a mode does not vibrate, or its frequency is outside the table of coefficients.
 
     Notes
     -----
-    ``W = π Im(Qᴴ G Q)`` and ``E = ½ ω² Qᴴ M Q``. The eigenvalue differs from it by terms of second order in the coefficients: it falls
-    four-fold where they are halved. Structural damping is that of frequencies above zero.
+    ``W = π Im(Qᴴ G Q)`` and ``E = ½ ω² Qᴴ M Q``. The eigenvalue method differs by terms of second order in the coefficients: with half the
+    coefficients the difference is a quarter. Structural damping has the sign for positive frequencies.
     """
     heavy = int(np.count_nonzero(structure.mass.diagonal()))
     count = min(heavy, 2 * n_modes + SPARE)
@@ -140,7 +140,7 @@ def _mode(
     pair = value, vector
 
     def felt(eigenvalue: complex) -> Matrix:
-        # matrices know the motion as it grows or decays, a table its frequency
+        # matrices are evaluated at the complex eigenvalue, a table at the frequency
         known = feedback.influence.depends_on_frequency
         inner = feedback.force(eigenvalue.imag if known else -1j * eigenvalue)
         return np.asarray(P @ inner @ P.conj().T)
@@ -156,7 +156,7 @@ def followed_mode(
     force: Callable[[complex], Matrix],
     start: tuple[complex, ComplexArray],
 ) -> tuple[complex, ComplexArray]:
-    """Return the eigenvalue and shape, in motions of unit mass, whose aerodynamic force is that at the eigenvalue itself."""
+    """Return the eigenvalue and shape, in modes of unit mass, with the aerodynamic force at this eigenvalue."""
     pair = start
     for _ in range(ITERATIONS):
         found = _nearest(stiffness, damping, force(pair[0]), pair)
@@ -169,7 +169,7 @@ def followed_mode(
 def _nearest(
     stiffness: ComplexArray, damping: ComplexArray, force: ComplexArray, near: tuple[complex, ComplexArray]
 ) -> tuple[complex, ComplexArray]:
-    """Return the eigenvalue, frequency above zero, whose shape of unit mass is most like another one."""
+    """Return the eigenvalue with positive frequency whose shape is closest to a given one, and the shape."""
     n = len(stiffness)
     zero, one = np.zeros((n, n)), np.eye(n)
     values, vectors = np.linalg.eig(np.block([[zero, one], [force - stiffness, -damping]]))
@@ -187,24 +187,24 @@ def least_stable_curve(
     phase_angles: FloatArray,
     reference: float,
 ) -> FloatArray:
-    """Return the aerodynamic damping ratio (n, a) of each mode over any inter-blade phase angle, by the energy method.
+    """Return the aerodynamic damping ratio (n, a) of each mode at any inter-blade phase angle, by the energy method.
 
     Parameters
     ----------
     influence
         Coefficients of one speed.
     angles
-        (a,) in rad.
+        (a,) inter-blade phase angles, rad.
     waves
-        Frequencies (n,), rad/s, and amplitudes (n, m) of the modes at the phase angles that the wheel has.
+        Frequencies (n,), rad/s, and amplitudes (n, m) of the modes at the phase angles of the wheel.
     phase_angles
-        (w,) theirs, in rad.
+        (w,) phase angles of the wheel, rad.
     reference
-        Frequency of the frozen form, rad/s, as of `Feedback`.
+        Frequency of the frozen form, rad/s, as in `Feedback`.
 
     Notes
     -----
-    Frequency and amplitudes of a mode between two waves are interpolated linearly in the angle; the coefficients are exact.
+    Between two waves, frequency and amplitudes of a mode are interpolated linearly in the angle; the coefficients are exact.
     """
     turn = 2 * np.pi
     order = np.argsort(np.mod(phase_angles, turn))

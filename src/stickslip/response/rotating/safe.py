@@ -1,4 +1,4 @@
-"""Natural frequencies of a bladed disk by nodal diameter, and the SAFE diagram: which engine orders meet a frequency of the nodal diameter that they excite.
+"""Natural frequencies of a bladed disk by nodal diameter, and the SAFE diagram of their resonances with engine orders.
 
 M. P. Singh, J. J. Vargo, D. M. Schiffer and J. D. Dello, "SAFE diagram: a design and reliability tool for turbine blading",
 Proceedings of the 17th Turbomachinery Symposium (1988) 93-101.
@@ -22,20 +22,20 @@ from stickslip.units import HZ
 
 @dataclass(frozen=True, eq=False)
 class NodalDiameterMap:
-    """Natural frequencies against the number of nodal diameters.
+    """Natural frequencies over the nodal diameter.
 
     Parameters
     ----------
     sectors
-        n_s of the wheel.
+        Number n_s of sectors.
     nodal_diameters
         (k,) ascending, each from 0 to n_s / 2.
     frequencies_hz
-        (k, n_modes) of the wave whose wave number is the nodal diameter: between 0 and n_s / 2 it runs backward, against rotation.
+        (k, n_modes) of the wave whose wave number is the nodal diameter; between 0 and n_s / 2 it travels backward, against rotation.
     forward_hz
-        (k, n_modes) of wave number n_s minus nodal diameter; equal to `frequencies_hz` unless Coriolis forces part them.
+        (k, n_modes) of wave number n_s minus nodal diameter; equal to `frequencies_hz` without Coriolis forces.
     shapes
-        (n, n_modes) of each nodal diameter on the travelling-wave structure, of unit mass; None where not kept.
+        (n, n_modes) for each nodal diameter on the travelling-wave structure, of unit mass; None if not kept.
     """
 
     sectors: int
@@ -45,7 +45,7 @@ class NodalDiameterMap:
     shapes: tuple[FloatArray | ComplexArray, ...] | None = None
 
     def row(self, nodal_diameter: int) -> int:
-        """Return the row of a nodal diameter; an `InputError` says if it was not computed."""
+        """Return the row of a nodal diameter; raise `InputError` if it was not computed."""
         found = np.flatnonzero(self.nodal_diameters == nodal_diameter)
         if not found.size:
             raise input_error(
@@ -63,7 +63,7 @@ class NodalDiameterMap:
         return np.asarray(table[self.row(k if backward else self.sectors - k)])
 
     def stationary_hz(self, speed: float) -> tuple[FloatArray, FloatArray]:
-        """Return the frequencies of backward and of forward waves as seen by who does not rotate, (k, n_modes) each.
+        """Return the frequencies of backward and of forward waves in the stationary frame, (k, n_modes) each.
 
         Parameters
         ----------
@@ -89,11 +89,11 @@ def nodal_diameter_map(
     sector
         One sector, at rest or at speed.
     n_modes
-        Frequencies of each nodal diameter.
+        Number of frequencies of each nodal diameter.
     nodal_diameters
-        Ascending; all if not given.
+        Ascending nodal diameters; None: all.
     coriolis
-        Whether the skew part of the sector's damping counts, which parts backward from forward waves.
+        Whether to include the skew part of the sector's damping, which separates backward from forward waves.
     shapes
         Whether to keep the mode shapes of `frequencies_hz`.
 
@@ -142,14 +142,14 @@ def _wave_modes(
 
 @dataclass(frozen=True)
 class Interference:
-    """One engine order and one mode of the nodal diameter that it excites.
+    """Engine order and a mode of the nodal diameter that it excites.
 
     Parameters
     ----------
     engine_order
         Oscillations per revolution.
     wave_number
-        Engine order modulo the number of sectors: the wave that it excites in the rotating frame.
+        Engine order modulo the number of sectors: the excited wave in the rotating frame.
     nodal_diameter
         Nodal diameter of the wave.
     mode
@@ -157,9 +157,9 @@ class Interference:
     frequency_hz
         Natural frequency.
     speed
-        At which the engine order would meet it, in rad/s; infinite where it never does.
+        Speed at which the engine order meets this frequency, rad/s; infinite if it never does.
     margin
-        Relative distance of that speed from the speed range, negative below it and zero within.
+        Relative distance of this speed from the speed range, negative below the range and zero within.
     """
 
     engine_order: int
@@ -182,11 +182,11 @@ class Safe:
     speed_range
         Lowest and highest speed, rad/s.
     engine_orders
-        Considered.
+        Engine orders compared.
     allowed
         Required margin.
     points
-        Every pair of engine order and mode, the closest first.
+        All pairs of engine order and mode, the closest first.
     """
 
     frequencies: NodalDiameterMap
@@ -202,22 +202,22 @@ class Safe:
 
     @property
     def not_judged(self) -> tuple[int, ...]:
-        """Engine orders that reach, with the margin, above the highest computed mode of the waves that they excite.
+        """Engine orders that, with the margin, exceed the highest computed mode of the waves that they excite.
 
-        Close frequencies there are missing from `points`, unless the map has all modes.
+        Unless the map has all modes, close frequencies above it are missing from `points`.
         """
         top = self.speed_range[1] * (1 + self.allowed) / (2 * math.pi)
         return tuple(m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0))
 
     def speed_line(self, speed: float, engine_orders: int | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return the zigzag that a speed draws: nodal diameters and frequencies in Hz of engine orders 0, 1, 2, ...
+        """Return the zigzag line of a speed: nodal diameters and frequencies in Hz of engine orders 0, 1, 2, ...
 
         Parameters
         ----------
         speed
-            In rad/s.
+            Rotor speed, rad/s.
         engine_orders
-            How far; to the highest one considered if not given. The line turns at n_s / 2 nodal diameters and at none.
+            Last engine order; None: the highest of the diagram. The line turns at n_s / 2 nodal diameters and at 0.
         """
         last = max(self.engine_orders) if engine_orders is None else engine_orders
         half = 0.5 * self.frequencies.sectors
@@ -237,29 +237,28 @@ def safe(
 ) -> Safe:
     """Compare engine orders with the frequencies of the nodal diameters that they excite.
 
-    On a wheel of n_s equal sectors engine order m works on wave number ``m mod n_s`` alone, so that crossing a natural frequency is not
-    enough for a resonance: the shape must fit as well.
+    On a wheel of n_s equal sectors, engine order m does work only on wave number ``m mod n_s``. A resonance therefore needs a matching
+    shape as well as a matching frequency.
 
     Parameters
     ----------
     frequencies
-        From `nodal_diameter_map`, at a speed within the range.
+        Result of `nodal_diameter_map`, at a speed within the range.
     speed
-        Operating speed in rad/s, or the lowest and the highest.
+        Operating speed, rad/s, or the lowest and the highest one.
     engine_orders
-        Positive.
+        Positive engine orders.
     margin
         Relative distance in speed below which a point counts as a resonance.
     growth
-        Wave number -> (n_modes,) derivatives of the squares of the natural frequencies by the square of the speed, at the one
-        operating speed: resonances are then where engine orders meet the modes along these straight lines (Southwell), as in a
-        Campbell diagram near that speed. Left out, frequencies are taken as those of the map at all speeds.
+        Function of the wave number that returns the (n_modes,) derivatives of squared natural frequencies by the squared speed, at the one
+        operating speed. Engine orders then meet the modes along these straight lines (Southwell), as in a Campbell diagram near this
+        speed. None: frequencies do not change with the speed.
 
     Raises
     ------
     InputError
-        If numbers do not make sense, a nodal diameter that an engine order excites is not in the map, or `growth` comes with a
-        range of speeds.
+        If a number is invalid, a nodal diameter excited by an engine order is not in the map, or `growth` is given with a range of speeds.
     """
     low, high = (speed, speed) if isinstance(speed, (int, float)) else speed
     if not 0 < low <= high < math.inf:
@@ -305,6 +304,6 @@ def _points(
 
 
 def _meeting(omega: float, slope: float, engine_order: int, speed: float) -> float:
-    """Return where ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``; infinite where the order never meets the line."""
+    """Return the Ω with ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``; infinite if the order never meets the line."""
     rest, rise = omega**2 - slope * speed**2, engine_order**2 - slope
     return math.sqrt(rest / rise) if rise != 0.0 and rest / rise > 0.0 else math.inf
