@@ -1,1 +1,1 @@
-"""Study files in, datasets out: the only place with pydantic and xarray."""
+"""From study files to datasets: tables, models, jobs and results."""

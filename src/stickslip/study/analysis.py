@@ -1,4 +1,4 @@
-"""Interface between runner and analyses: a question, its table, its jobs, its records, its dataset."""
+"""Interface between the runner and an analysis: its table, jobs, records and dataset."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ class Case:
     build
         Function that makes the model. The runner calls it in its own process, and only for unfinished jobs.
     digest
-        Hash of everything the model depends on: its tables and the content of its files.
+        Hash of everything the model depends on: tables and the content of files.
     home
         Folder to which file names are relative.
     checks
@@ -44,13 +44,13 @@ class Case:
     store
         Cache for expensive parts of the model; argument of `assemble`.
     digest_at_rest
-        The same hash without harmonic loads and outputs.
+        Hash without harmonic loads and outputs.
     at
-        Function that makes the model with another value of a key, picklable; None if no key can be changed.
+        Picklable function that makes the model with another value of a key; None if no key can be changed.
     accepts
-        Function that refuses an invalid value of a key without building a model; None if only the model can tell.
+        Function that refuses an invalid value of a key without building a model; None if only building the model shows it.
     drive
-        Ratio of harmonic to static forces. The larger it is, the more contacts slip and the longer a response takes.
+        Ratio of harmonic to static forces. With a larger ratio more contacts slip, and a response takes longer.
     """
 
     index: int
@@ -75,7 +75,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One case of one analysis, picklable. Any process can solve it; it appends records to its own journal and seals one file.
+    """One case of one analysis, picklable. Any process can solve it, and writes its records to a journal, one file.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Solved:
 
 
 class Notes(Protocol):
-    """Store of a job for everything that is no record; kept in the journal, so it survives an interruption."""
+    """Store of a job for data that are no records. It is part of the journal, so it survives an interruption."""
 
     def put(self, name: str, values: Mapping[str, Any]) -> None:
         """Store named arrays, numbers and texts."""
@@ -149,7 +149,7 @@ class Pieces:
     taken: int = 0
 
     def keep(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        """Return the result of `make`, stored or new; `content` is everything that it depends on."""
+        """Return the stored result of `make`, or make and store it; `content` is everything that it depends on."""
         place = f"{self.name} {sha256(content.encode()).hexdigest()}"
         known = self.notes.get(place)
         if known is not None:
@@ -164,7 +164,7 @@ class Pieces:
         return made
 
     def give_up(self) -> None:
-        """Remove the pieces when their final result is stored."""
+        """Remove the pieces after the final result is stored."""
         for place in self.places:
             self.notes.forget(place)
         self.places.clear()
@@ -177,13 +177,13 @@ class Advice:
     Parameters
     ----------
     computed
-        What will be computed, and its cost.
+        Planned computations and their cost.
     doubts
-        What is likely wrong, in whole sentences.
+        Probable mistakes, in whole sentences.
     at_rest
-        What contacts and dampers do under the static loads.
+        States of contacts and dampers under the static loads.
     beside
-        What stands beside the asked range: natural frequencies, and what friction can do.
+        Context of the frequency range: natural frequencies, and the possible effect of friction.
     """
 
     computed: tuple[str, ...] = ()
@@ -193,8 +193,8 @@ class Advice:
 
 
 def of_tables(*tables: str) -> Callable[[Case], str]:
-    """Return the `key` function of an analysis whose records depend on these tables beside the model."""
-    return partial(_key, tables)  # which another process can be given
+    """Return the `key` function of an analysis whose records depend on these tables and the model."""
+    return partial(_key, tables)  # a partial is picklable, a nested function is not
 
 
 def _key(tables: tuple[str, ...], case: Case) -> str:
@@ -213,7 +213,7 @@ def nothing_to_add(data: xr.Dataset, _measured: MeasuredPeaks | None) -> xr.Data
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
-    """A question that a study may ask. The module of each analysis defines one instance; `ANALYSES` lists them.
+    """An analysis that a study may request. Its module defines one instance; `ANALYSES` lists them.
 
     Parameters
     ----------
@@ -224,34 +224,34 @@ class Analysis:
     record
         Dataclass of the records of `solve`: arrays, numbers, texts, enumerations and None.
     key
-        Returns, as text, everything that the records of a case depend on beside its model: tables and files, not titles or checks.
+        Returns, as text, everything except the model that the records of a case depend on: tables and files, not titles or checks.
     inputs
         Returns the inputs of `solve`. Raises InputError, before any long computation, for a case that cannot be answered.
     solve
-        Generator of the records that are not yet done, in the order of solution. `dataset` does not have the model, so other data for it go
-        into the notes. `store.progress.advance` reports progress.
+        Generator of the missing records, in the order of solution. `dataset` has no access to the model, so other data for it go into the
+        notes. `store.progress.advance` reports progress.
     dataset
         Returns the node of the result from all cases sealed so far. Variables of a case have the leading dimension ``case``; the runner
-        adds ``case_label`` and ``vary_value``. Attributes: ``failed``, the number of points without a solution (0 if left out), and the
+        adds ``case_label`` and ``vary_value``. Attributes: ``failed``, the number of points without a solution (default 0), and the
         verdicts.
     check
-        Returns the lines of ``stickslip check`` on a case: what will be computed, its choices and its cost; or an `Advice`.
+        Returns the lines of ``stickslip check`` on a case (planned computations, choices, cost), or an `Advice`.
     summary
         Returns the terminal tables of a dataset.
     linear
-        Whether it concerns small vibrations about the static state. These do not depend on harmonic loads and outputs, so cases that differ
-        in these alone share a job.
+        Whether the analysis concerns small vibrations about the static state. These do not depend on harmonic loads and outputs, so cases
+        that differ only in these share a job.
     shared
-        Names of the other tables that it reads; a `Model` takes their keys with its own.
+        Names of other tables that the analysis reads; the method of `Model` accepts their keys, too.
     answers
         Classes of the records of a case, whose columns are the variables of the node; the documentation lists them.
     checks
-        Names of additional checks that a run may ask for (``verify``). A sealed job without them is opened again: `solve` then finds all
-        its records done and writes the outcome of the checks into the notes.
+        Names of additional checks that a run may request (``verify``). A sealed job without them is opened again: `solve` then finds all
+        records done and writes the outcome of the checks into the notes.
     verdicts
-        Returns the verdicts on a finished dataset; terminal, page, file and Python show these and nothing else.
+        Returns the verdicts on a finished dataset, the only ones that terminal, page, file and Python show.
     completed
-        Adds to a dataset whatever needs all cases, or the measured peaks of the study.
+        Adds variables to a dataset that need all cases or the measured peaks of the study.
     """
 
     name: str
@@ -279,7 +279,7 @@ def named(name: str) -> Analysis:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text: heading, column names, cells, and lines below. With `detail` a terminal shows it on request only."""
+    """A table as text: heading, column names, cells, and lines below. With `detail` a terminal shows it only on request."""
 
     title: str
     head: tuple[str, ...]

@@ -27,7 +27,7 @@ NO_DOUBT = "nothing that can be seen without solving"
 
 
 def check_study(study: Study) -> tuple[str, ...]:
-    """Build every model, refuse all that a run would refuse, log what will be computed and what is doubtful, and return the doubts.
+    """Build every model, refuse what a run would refuse, log planned computations and doubts, and return the doubts.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_study(study: Study) -> tuple[str, ...]:
             every += [Advice(computed=tuple(first_nodes(model.places, model.outputs)), doubts=model.warnings)]
             every += [_as_advice(one.check(case, model)) for one in asked]
             every += [Advice(at_rest=tuple(_free(model)))]
-        # what holds for all cases is said once
+        # a line that is the same for all cases is logged once
         new, first = _new(every, told), told == Advice()
         told = _joined([told, new])
         if first and not new.doubts:
@@ -74,7 +74,7 @@ def _joined(every: Iterable[Advice]) -> Advice:
 
 
 def _new(every: Iterable[Advice], told: Advice) -> Advice:
-    """Return the lines that were not told before, each once."""
+    """Return the lines that were not logged before, each once."""
     joined = _joined(every)
     known = {name: set(getattr(told, name)) for name in SECTIONS}
     return Advice(**{n: tuple(dict.fromkeys(t for t in getattr(joined, n) if t not in known[n])) for n in SECTIONS})
@@ -96,7 +96,7 @@ def _tell(label: str, advice: Advice) -> None:
 
 
 def _free(model: Model) -> list[str]:
-    """Name the parts that are free although all contacts stick; analyses that cannot handle this refuse it themselves."""
+    """Name the parts that are free even if all contacts stick; analyses that cannot handle this refuse it themselves."""
     if model.stages is not None:
         return []
     return [f"note: {error}" for error in unheld(model, np.ones(len(model.pairs.names), dtype=bool))]

@@ -1,6 +1,6 @@
 """Coordinates of the dataset of an analysis: cases, varied keys, frequencies, speeds and outputs.
 
-They are made once, where a run puts its dataset together and where a result is opened, so results of every version have them.
+They are made both when a run assembles its dataset and when a result is opened, so results of every version have them.
 """
 
 import re
@@ -21,18 +21,18 @@ from stickslip.study.questions import ANALYSES
 from stickslip.study.varied import as_number, varied_values
 
 CASE, POINT = "case", "point"  # the dimensions of cases, and of the points of all cases
-OWNER = "point_case"  # index of the case of each point where all cases share `point`
-VARIED_KEY = "varied_key"  # attribute of a coordinate that has the values of a varied key
-PLACES = ("frequency_hz", "speed_rpm")  # ends of the names of what positions a row
-LABELS = ("output_label", "output_name")  # names of the outputs where the dimension has none
-RELATIVE_ERROR_OF_VALUES = 1e-9  # relative difference below which a number that is asked for is a value of the key
+OWNER = "point_case"  # index of the case of each point if all cases share the dimension `point`
+VARIED_KEY = "varied_key"  # attribute of coordinates that hold the values of a varied key
+PLACES = ("frequency_hz", "speed_rpm")  # endings of the names of variables that give a row its position
+LABELS = ("output_label", "output_name")  # names of the outputs if their dimension has no coordinate
+RELATIVE_ERROR_OF_VALUES = 1e-9  # relative difference below which a requested number equals a value of the key
 
 
 class Varied(xr.Index):
-    """Index of the varied keys along one dimension: ``data.sel(ratio=5, mu=0.3)`` takes the points, or cases, with these values.
+    """Index of the varied keys along one dimension: ``data.sel(ratio=5, mu=0.3)`` selects points, or cases, with these values.
 
-    A value, a list of values or a slice of numbers may be asked for. In a table of pandas the keys are levels of its index, after the number
-    of the point or the label of the case.
+    The request may be a value, a list of values or a slice of numbers. In a pandas table the keys are index levels, after the number of the
+    point or the label of the case.
     """
 
     def __init__(self, dim: Hashable, values: Mapping[Hashable, xr.Variable]) -> None:
@@ -46,7 +46,7 @@ class Varied(xr.Index):
 
     @classmethod
     def concat(cls, indexes: Sequence["Varied"], dim: Hashable, positions: Any = None) -> "Varied":
-        """Return the index of datasets one after the other."""
+        """Return the index of concatenated datasets."""
         found = {
             name: xr.Variable.concat([one.values[name] for one in indexes], dim, positions)  # type: ignore[no-untyped-call]
             for name in indexes[0].values
@@ -58,7 +58,7 @@ class Varied(xr.Index):
         return {name: own.copy(deep=False) for name, own in self.values.items()}
 
     def to_pandas_index(self) -> pd.Index:
-        """Return the index of a table."""
+        """Return the index as a pandas index."""
         names = [self.dim, *(name for name in self.values if name != self.dim)]
         return pd.MultiIndex.from_arrays([self.values[name].values for name in names], names=names)
 
@@ -68,9 +68,9 @@ class Varied(xr.Index):
         return type(self)(self.dim, found) if all(own.dims == (self.dim,) for own in found.values()) else None
 
     def sel(self, labels: dict[Any, Any], method: str | None = None, tolerance: Any = None) -> IndexSelResult:
-        """Return the positions at which all keys have the values asked for.
+        """Return the positions at which all keys have the requested values.
 
-        Where each key has one value left, the keys are single coordinates of the selection, and nothing is aligned by them.
+        If each key has a single value left, the keys become scalar coordinates of the selection, which align nothing.
 
         Raises
         ------
@@ -86,11 +86,11 @@ class Varied(xr.Index):
             return IndexSelResult({self.dim: int(at[0])})
         single = {name: own[0] for name, own in keys.items()}
         every = list(self.values)
-        # xarray looks at what is to be dropped only if it is given an index
+        # xarray drops coordinates only if the result contains an index
         return IndexSelResult({self.dim: at}, {self.dim: self}, single, drop_coords=[self.dim], drop_indexes=every)
 
     def equals(self, other: xr.Index, *, exclude: Any = None) -> bool:
-        """Return whether two indexes have the same values."""
+        """Whether two indexes have the same values."""
         if not isinstance(other, Varied) or self.values.keys() != other.values.keys():
             return False
         return all(np.array_equal(own.values, other.values[name].values) for name, own in self.values.items())
@@ -103,7 +103,7 @@ class Varied(xr.Index):
 
 
 def _positions(name: str, values: np.ndarray[Any, Any], asked: Any, method: str | None) -> BoolArray:
-    """Return where the values of a key are those asked for."""
+    """Return a mask of the positions at which a key has one of the requested values."""
     number = values.dtype.kind in "fi"
     if np.asarray(asked).dtype == bool:
         return np.asarray(asked)
@@ -126,25 +126,25 @@ def _positions(name: str, values: np.ndarray[Any, Any], asked: Any, method: str 
 
 
 def with_coordinates(data: xr.Dataset, analysis: str) -> xr.Dataset:
-    """Return a dataset with what positions its entries as coordinates; values and their names stay as they are.
+    """Return a dataset with coordinates for its entries; values and their names stay the same.
 
     Parameters
     ----------
     data
         Dataset of an analysis with ``case_label``, and with ``vary_value`` where keys are varied.
     analysis
-        Name of the analysis, whose `Home` names the variables that are coordinates.
+        Name of the analysis; its `Home` names the variables that are coordinates.
 
     Returns
     -------
     xr.Dataset
-        It has these coordinates beside those that its `Home` names:
+        Dataset with the coordinates that its `Home` names, and with:
 
-        - ``case``: labels of the cases, where keys are varied;
-        - each varied key by the shortest end of its name that nothing else has (``force_n`` for ``load.shaker.force_n``), along the points
-          or, where there are no points of all cases in one row, along the cases; in the former case ``case_force_n`` runs over the cases;
-        - the case, frequency and speed of rows of all cases (``point_case``, ``frequency_hz``, ``attempt_frequency_hz`` ...);
-        - the names of the outputs.
+        - ``case``: labels of the cases, if keys are varied;
+        - each varied key, under the shortest unique end of its name (``force_n`` for ``load.shaker.force_n``): along the points of all
+          cases, with ``case_force_n`` along the cases; without such points only along the cases;
+        - case, frequency and speed of rows of all cases (``point_case``, ``frequency_hz``, ``attempt_frequency_hz`` ...);
+        - names of the outputs.
     """
     if any(VARIED_KEY in data[name].attrs for name in data.coords):
         return data
@@ -168,7 +168,10 @@ def with_coordinates(data: xr.Dataset, analysis: str) -> xr.Dataset:
 
 
 def selectable(data: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in which `sel` takes values of the varied keys, and of labels such as nodal diameters, which `with_coordinates` made coordinates."""
+    """Return a dataset in which `sel` accepts values of varied keys and of labels such as nodal diameters.
+
+    `with_coordinates` has made them coordinates before.
+    """
     data = _with_labels(data)
     keys = [name for name in data.coords if VARIED_KEY in data[name].attrs]
     for dim in dict.fromkeys(data[name].dims[0] for name in keys):
@@ -181,7 +184,7 @@ def selectable(data: xr.Dataset) -> xr.Dataset:
 
 
 def _with_labels(data: xr.Dataset) -> xr.Dataset:
-    """Return a dataset whose labels of rows (whole numbers and words) that all cases share are coordinates of their rows alone, with an index."""
+    """Return a dataset in which row labels (whole numbers and words) that all cases share become indexed coordinates of the rows."""
     found: dict[Hashable, dict[Hashable, xr.Variable]] = {}
     for name in data.coords:
         own = data[name].variable
@@ -198,14 +201,14 @@ def _with_labels(data: xr.Dataset) -> xr.Dataset:
 
 
 def as_stored(data: xr.Dataset) -> xr.Dataset:
-    """Return a dataset without the coordinates of cases and varied keys; the others that `with_coordinates` made are variables again."""
+    """Return a dataset as stored: without coordinates of cases and varied keys; other coordinates are variables again."""
     made = [name for name in data.coords if name in (CASE, POINT) or VARIED_KEY in data[name].attrs]
     data = data.drop_vars(made)
     return data.reset_coords([name for name in data.coords if name not in data.dims])
 
 
 def short_names(keys: Sequence[str], taken: Collection[str]) -> list[str]:
-    """Return for each key the shortest end that neither another key has nor is taken, with underscores for dots."""
+    """Return for each key its shortest unique end that is not in `taken`, with underscores for dots."""
     ends = [[re.sub(r"\W", "_", ".".join(parts[-n:])) for n in range(1, len(parts) + 1)] for parts in _parts(keys)]
     often = Counter(end for own in ends for end in own)
     free = [[end for end in own if often[end] == 1 and not {end, f"{CASE}_{end}"} & set(taken)] for own in ends]
@@ -217,7 +220,7 @@ def _parts(keys: Sequence[str]) -> list[list[str]]:
 
 
 def _of_key(key: str, values: np.ndarray[Any, Any]) -> xr.Variable:
-    """Return the values of a key over the cases, as numbers if all are, with the unit that its name ends with."""
+    """Return the values of a key over the cases, as numbers if possible, with the unit at the end of its name."""
     numbers = np.array([as_number(v) for v in values])
     found = numbers if np.all(np.isfinite(numbers)) else np.array([str(v) for v in values])
     return xr.Variable((CASE,), found, {"units": _unit(key), "long_name": key, VARIED_KEY: key})
@@ -230,7 +233,7 @@ def _unit(key: str) -> str:
 
 
 def _positions_rows(data: xr.Dataset, name: str) -> bool:
-    """Return whether a variable has the case, frequency or speed of rows in which the points of all cases stand."""
+    """Whether a variable is the case, frequency or speed of rows that hold the points of all cases."""
     dims = data[name].dims
     if len(dims) != 1 or dims == (CASE,):
         return False
@@ -239,7 +242,7 @@ def _positions_rows(data: xr.Dataset, name: str) -> bool:
 
 
 def _with_outputs(data: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with the names of the outputs along their dimension, where all cases have the same."""
+    """Return a dataset with the names of the outputs along their dimension, if they are the same in all cases."""
     name = next((n for n in LABELS if n in data and data[n].ndim == 2), None)
     if name is None:
         return data

@@ -8,9 +8,9 @@ from stickslip.contact.loop_fit import LoopFit, fit_loops
 from stickslip.errors import InputError
 from stickslip.model.readers.measured_columns import read_loops
 
-WIDTH = 24  # of the column of names
+WIDTH = 24  # characters of the column of names
 UNTOLD = "not told"
-# what the arguments of the fit are called here
+# options of the command for the arguments of the fit
 _OPTIONS = {
     "fit_loops: normal_load": "--normal-load",
     "fit_loops: normal_load_deviation": "--normal-load-deviation",
@@ -24,7 +24,7 @@ def fit_file(path: Path, **options: Any) -> LoopFit:
     Raises
     ------
     InputError
-        Naming the file, or the option.
+        If file or options are invalid; the message names the file or the option.
     """
     loops = read_loops(path)
     try:
@@ -35,7 +35,7 @@ def fit_file(path: Path, **options: Any) -> LoopFit:
 
 
 def estimates(fit: LoopFit) -> list[str]:
-    """Return the estimates with their standard deviations, a line each."""
+    """Return a line for each estimate with its standard deviation."""
     off = fit.deviations
     samples = sum(x.size for x, _ in fit.loops)
     swing = max(float(f.max() - f.min()) for _, f in fit.loops)
@@ -84,7 +84,7 @@ def _line(key: str, value: float, deviation: float) -> str:
 
 
 def _value(value: float, deviation: float, unit: str, least: float = math.nan) -> str:
-    """Return ``1.234 ± 0.012 N``; for an undetermined value its certain lower bound."""
+    """Return ``1.234 ± 0.012 N``; for an undetermined value its lower bound."""
     if math.isnan(value):
         bound = f", at least {least:.4g} {unit}".rstrip() if math.isfinite(least) else ""
         return UNTOLD + bound
@@ -92,7 +92,7 @@ def _value(value: float, deviation: float, unit: str, least: float = math.nan) -
 
 
 def _rounded(value: float, deviation: float) -> str:
-    """Write a value with two uncertain digits by its standard deviation."""
+    """Return a value rounded to the second digit of its standard deviation."""
     digits = 6
     if 0 < deviation < abs(value):
         digits = min(math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation)) + 2, 10)

@@ -12,8 +12,8 @@ from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
 from stickslip.study.store.progress import LOG
 
-WIDTH = 26  # of the column of names
-# what the arguments of readers are called here
+WIDTH = 26  # characters of the column of names
+# options of the command for the arguments of readers
 _OPTIONS = {
     "mesh": "--mesh",
     "mass": "part.NAME.mass in a study",
@@ -44,7 +44,7 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[
     """
     system = Units.named(units)
     LOG.info(f"reading {path} in {system.name}")
-    # doubtful numbers are shown with a remark, not refused: that is what one inspects a file for
+    # doubtful numbers are shown with a remark, not refused, since users inspect a file to find them
     try:
         model = read_model(path, units=system, mesh=mesh, plausible=False)
     except InputError as error:

@@ -35,10 +35,10 @@ from stickslip.study.store.worker_process import Limits, blas_threads
 from stickslip.study.store.workers import Hands
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
-LOST = 3  # workers lost at the same place: they may be lost for reasons of their own
-EARLY = 30  # and before they had begun, which is hardly the job's fault
-LOOK = 5.0  # seconds between two looks whether anything may be going on
-SILENCE = 60.0  # seconds that it may not
+LOST = 3  # workers lost without progress, after which a job is set aside: single losses may have other causes
+EARLY = 30  # the same for workers lost before they began, which is hardly the job's fault
+LOOK = 5.0  # seconds between two checks of the executor
+SILENCE = 60.0  # seconds of reported trouble without a finished job, after which the run ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +48,15 @@ class Order:
     Parameters
     ----------
     analysis, job, checks
-        The analysis, one of its jobs, and the checks asked for.
+        The analysis, one of its jobs, and the requested checks.
     sealed
         File of the finished job.
     limits
         Limits on time and memory.
     owner
-        Owner of the file at work; empty: no other process may write it.
+        Process that owns the file of the running job; empty: only one process writes it.
     code
-        Code of the user that the job needs; None for none.
+        User's code that the job needs; None for none.
     """
 
     analysis: Analysis
@@ -69,7 +69,7 @@ class Order:
 
     @property
     def file(self) -> Path:
-        """File of the job at work."""
+        """File of the running job."""
         return file_at_work(self.sealed, self.owner)
 
     def packed(self, owner: str = "") -> Parcel:
@@ -81,14 +81,14 @@ class Order:
 
 @dataclass
 class Loss:
-    """Count of lost workers since a job last made progress.
+    """Numbers of lost workers since a job last made progress.
 
     Parameters
     ----------
     begun
-        Workers lost after they had opened a file for the job.
+        Number of workers lost after they had opened a file for the job.
     early
-        Workers lost before.
+        Number of workers lost before that.
     files
         Number of files left behind.
     furthest
@@ -101,7 +101,7 @@ class Loss:
     furthest: tuple[int, ...] = ()
 
     def count(self, left: Sequence[Path]) -> None:
-        """Count one more lost worker; `left` are the files left behind."""
+        """Count a lost worker; `left` are the files left behind."""
         furthest = max(map(reached, left), default=())
         if furthest > self.furthest > ():
             self.begun = self.early = 0
@@ -113,7 +113,7 @@ class Loss:
 
 
 def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Path]:
-    """Work off jobs in their order; yield the file of each job when it is sealed.
+    """Execute jobs in their order; yield the file of each job when it is sealed.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _submitted(pool: Executor, order: Order, *others: Any) -> Future[Answer]:
     parcel = order.packed()
     try:
         return pool.submit(solve_far, parcel, *others)
-    except Exception as error:  # whatever the library makes of its end
+    except Exception as error:  # libraries raise different errors for an executor that has ended
         raise _gone(str(error)) from error
 
 
@@ -177,7 +177,7 @@ def _gone(why: str) -> StickslipError:
 
 
 def _ended(future: Future[Any], order: Order, lost: dict[Path, Loss], *, far: bool) -> bool:
-    """Raise the exception of a job and log its lines; return whether it has ended, which is false after the loss of its worker."""
+    """Log the lines of a job and raise its exception; return whether it has ended, False if only its worker was lost."""
     if not far:
         future.result()
         return True
@@ -186,7 +186,7 @@ def _ended(future: Future[Any], order: Order, lost: dict[Path, Loss], *, far: bo
         answer: Answer = future.result()
     except UNKNOWN as error:
         raise unknown(label, error) from error
-    except Exception as error:  # noqa: BLE001  each library has its own for a worker that is lost
+    except Exception as error:  # noqa: BLE001  each library has its own error for a lost worker
         loss = lost.setdefault(order.sealed, Loss())
         loss.count(left_behind(order.sealed))
         if loss.begun < LOST and loss.early < EARLY:
@@ -214,7 +214,7 @@ def _watched_here(order: Order, hands: Hands) -> None:
 
 
 def solve(order: Order, file: Path) -> None:
-    """Solve a job from the state in its file, and seal the file. Runs in any process."""
+    """Solve a job from the state in its file, and seal the file. It can run in any process."""
     begin(order.sealed, file, order.analysis.record)
     with until_sealed_elsewhere(order.sealed, file), JobJournal(file, order.analysis.record) as journal:
         journal.forget(ASIDE)
@@ -235,7 +235,7 @@ def solve_job(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[
             for record in asked.solve(job.inputs, done, journal):
                 journal.add(record)
     except NO_SOLUTION as error:
-        # a job without a solution must not take the finished ones with it
+        # a job without a solution must not stop the run
         words = asked.name.replace("_", " ")
         journal.put(UNSOLVED, {"text": f"{words} has no solution ({error})"})
     journal.put(CHECKED, {"names": sorted(checks | checked(journal.get(CHECKED)))})

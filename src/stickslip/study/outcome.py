@@ -18,7 +18,7 @@ from stickslip.study.store.provenance import Provenance
 from stickslip.study.store.watch import ASIDE
 from stickslip.study.verdict import ATTRIBUTE, Verdict, of_tree, stored, to_json
 
-# notes that the runner itself puts down
+# names of notes that the runner itself writes
 UNSOLVED, CHECKED = "no solution", "checks"
 REMEDIES = {
     UNSOLVED: "Check what holds the parts, and the size of the loads.",
@@ -33,7 +33,7 @@ class Outcome:
     Parameters
     ----------
     tree
-        One node an analysis; the attributes of the root hold the provenance.
+        One node for each analysis; the attributes of the root hold the provenance.
     summaries
         Terminal tables of each analysis.
     failed
@@ -41,7 +41,7 @@ class Outcome:
     files
         Files of the run, the result first.
     waits
-        Shards still missing, in words; empty for a complete result.
+        Sentence about missing shards; empty for a complete result.
     """
 
     tree: xr.DataTree
@@ -85,7 +85,7 @@ def checked(note: Mapping[str, Any] | None) -> frozenset[str]:
 
 @dataclass(frozen=True, eq=False)
 class Book:
-    """Finished jobs of a run. Each case is judged when its job ends; nodes of analyses are made when the tree is asked for."""
+    """Finished jobs of a run. Each case is judged when its job ends; the nodes of analyses are made on request of the tree."""
 
     origin: Provenance
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
@@ -109,7 +109,7 @@ class Book:
                     self._judge(asked, Solved(task.case, *self.solved[task.sealed]))
 
     def _judge(self, asked: Analysis, solved: Solved) -> None:
-        """Log the verdicts on a case; a verdict equal to that of an earlier case is logged later, for all cases together."""
+        """Log the verdicts on a case; a verdict that an earlier case had is logged later, for all cases together."""
         if ASIDE in solved.notes:
             self._tell([_unsolved(solved, ASIDE)])
             return
@@ -146,7 +146,7 @@ class Book:
 
     @property
     def _names(self) -> list[str]:
-        """Names of the nodes in an order independent of the jobs' ends."""
+        """Names of the nodes in an order that does not depend on the order in which jobs end."""
         return sorted(self.nodes, key=[*ANALYSES, *self.nodes].index)
 
     def tree(self, *, complete: bool) -> xr.DataTree:

@@ -1,7 +1,7 @@
-"""Objects of a user's modules that a study file names as ``my_module:Name``.
+"""Objects in the user's modules that a study file names as ``my_module:Name``.
 
-A file cannot run code by itself: the user allows it for each command. The module is looked for beside the study file first, then among
-the installed ones. The hashes of its files are a part of what a result depends on.
+A file cannot run code by itself: the user allows it for each command. The module is searched beside the study file first, then among
+installed modules. Results depend on the hashes of its files.
 """
 
 import ast
@@ -21,13 +21,13 @@ from stickslip.errors import InputError, StickslipError, did_you_mean, input_err
 
 ADDRESS = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 ALLOW = "If you trust it, add --allow-code to the command (in Python: Study.from_file(path, allow_code=True))."
-CODE_FILE = "own_code.json"  # of a results folder: hashes at the last run
-_USED: set[str] = set()  # files of the modules that were imported here
+CODE_FILE = "own_code.json"  # file in a results folder with the hashes at the last run
+_USED: set[str] = set()  # files of user modules imported by this process
 
 
 @dataclass(frozen=True, eq=False)
 class OwnCode:
-    """Code of the user that a study may use.
+    """User's code that a study may use.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class OwnCode:
     allowed
         Whether the user allows it.
     remedy
-        What to do where it is not allowed.
+        Remedy in the message if it is not allowed.
     files
         Name and SHA-256 of each file used so far; `at` adds to it.
     """
@@ -54,16 +54,16 @@ class OwnCode:
         address
             The address, as in the file.
         kind
-            What the object has to be, in words: ``strategy``.
+            Required kind of the object, for messages, such as ``strategy``.
         members
-            Names of the attributes that it has to have.
+            Names of required attributes.
         instance
-            Whether a class stands for its instance, made without arguments.
+            Whether a class is replaced by its instance, made without arguments.
 
         Raises
         ------
         InputError
-            If it is not allowed (nothing is imported then), the module cannot be imported, or the object is missing or lacks a member.
+            If code is not allowed (nothing is imported then), the module cannot be imported, or the object is missing or lacks a member.
         """
         module, _, name = address.partition(":")
         if not ADDRESS.fullmatch(address):
@@ -81,7 +81,7 @@ class OwnCode:
             known = [word for word in vars(loaded) if not word.startswith("_")]
             raise _refused(f"{module} has no {name!r}, got {address!r}", did_you_mean(name, known))
         found = made(found, address) if instance else found
-        lacking = [word for word in members if word not in dir(found)]  # to read a kernel is to compile it
+        lacking = [word for word in members if word not in dir(found)]  # hasattr would compile kernels
         if lacking:
             raise _refused(
                 f"{name} of {module} is no {kind}: it has no {lacking[0]!r}, got {address!r}",
@@ -93,7 +93,7 @@ class OwnCode:
 
 @dataclass(frozen=True)
 class Shipped:
-    """Code of the user that a job needs; another process imports the same.
+    """User's code that a job needs, for import in another process.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class Shipped:
         Raises
         ------
         StickslipError
-            If a file beside the study is not the one that the run began with.
+            If a file beside the study has changed since the run began.
         """
         _first_on_path(self.home)
         now = {name: _hash(self.home / name) for name in self.files if (self.home / name).is_file()}
@@ -124,18 +124,18 @@ class Shipped:
 
 
 def is_address(given: object) -> bool:
-    """Whether a value of a study file names an object of a module instead of a built-in one."""
+    """Whether a value of a study file is an address ``my_module:Name`` instead of a built-in name."""
     return isinstance(given, str) and ":" in given
 
 
 def of_address(address: str) -> Any:
-    """Return the object at an address that `OwnCode.at` has accepted."""
+    """Return the object at an address that `OwnCode.at` has already accepted."""
     module, _, name = address.partition(":")
     return getattr(import_module(module), name)
 
 
 def state_of(address: str) -> str:
-    """Return a text that changes with the files of the module at an address that `OwnCode.at` has accepted."""
+    """Return a text that changes with the module's files, for an address that `OwnCode.at` has already accepted."""
     module = address.partition(":")[0]
     source = getattr(import_module(module.partition(".")[0]), "__file__", None)
     if source is None:
@@ -146,12 +146,12 @@ def state_of(address: str) -> str:
 
 
 def called(address: str, place: str, *given: Any, **named: Any) -> Any:
-    """Return what the function at an accepted address returns.
+    """Call the function at an accepted address and return its result.
 
     Raises
     ------
     InputError
-        If the function raises anything: its own `InputError`, or the error at `place`, with its line.
+        If the function raises an exception: its own `InputError`, or else an error at `place` with the line of the exception.
     """
     function = of_address(address)
     try:
@@ -168,14 +168,14 @@ def called(address: str, place: str, *given: Any, **named: Any) -> Any:
 
 
 def line_of(error: BaseException) -> str | None:
-    """Return file and line of the user's code in which an error was raised; None if it passed through none."""
+    """Return file and line of the user's code in which an error was raised; None if no user code was involved."""
     homes = {Path(source).parent for source in _USED}
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).parent in homes]
     return f"{Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else None
 
 
 def made(found: Any, address: str) -> Any:
-    """Return an instance of a class, made without arguments; other objects are returned as they are.
+    """Return an instance of a class, made without arguments; return other objects unchanged.
 
     Raises
     ------
@@ -248,14 +248,14 @@ def _first_on_path(home: Path) -> None:
 
 
 def _file_beside(module: str, home: Path) -> Path | None:
-    """Return the file of a module beside the study; None if it stands elsewhere."""
+    """Return the file of a module beside the study; None if it is elsewhere."""
     stem = home.joinpath(*module.split("."))
     found = (path for path in (stem.with_suffix(".py"), stem / "__init__.py") if path.is_file())
     return next(found, None)
 
 
 def _files(module: str, home: Path) -> dict[str, str]:
-    """Return name and hash of the file of a module beside the study, and of the files beside it that these import."""
+    """Return names and hashes of a module's file beside the study, and of all files beside the study that it imports."""
     found: dict[str, str] = {}
     left = [module]
     while left:
@@ -268,7 +268,7 @@ def _files(module: str, home: Path) -> dict[str, str]:
 
 
 def _imports(path: Path) -> list[str]:
-    """Return the names of the modules that a file imports; none of a file that is not Python."""
+    """Return the names of the modules that a file imports; an empty list if it is not valid Python."""
     try:
         tree = ast.parse(path.read_bytes())
     except (SyntaxError, ValueError):

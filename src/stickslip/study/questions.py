@@ -1,7 +1,7 @@
-"""The analyses that a study may ask for, one entry each: where its functions, its table and its section of the page stand.
+"""Registry of the analyses that a study may request, with the addresses of their functions, tables and sections of the page.
 
-A file is judged by the tables alone; the analyses, with all that they compute, are loaded when it is found good. The order is that of
-computation, of terminal tables and of the page.
+A study file is checked with the tables only; the analyses are imported after the file has passed. The order in the registry is the
+order of computation, of terminal tables and of the page.
 """
 
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Home:
-    """Addresses ``module:name`` of what makes an analysis.
+    """Addresses ``module:name`` of the objects that define an analysis.
 
     Parameters
     ----------
     analysis
-        Its `Analysis`.
+        Address of its `Analysis`.
     table
-        pydantic class of its table in a study file; empty: a study file cannot ask for it.
+        Address of the pydantic class of its table; empty: a study file cannot request it.
     page
-        Its `Section` of the page; empty: it has none.
+        Address of its `Section` of the page; empty: it has none.
     axes
-        Names of the variables that are coordinates of its dataset, such as the frequencies of a response.
+        Names of the variables that become coordinates of its dataset, such as the frequencies of a response.
     """
 
     analysis: str
@@ -38,12 +38,12 @@ def loaded(address: str) -> Any:
 
 
 def _folder(name: str, analysis: str, table: str, page: str = "page", axes: tuple[str, ...] = ()) -> Home:
-    """Return the addresses of an analysis in a folder of its own."""
+    """Return the addresses of an analysis that has its own folder."""
     own = f"stickslip.analyses.{name}"
     return Home(f"{own}.analysis:{analysis}", f"{own}.table:{table}", f"{own}.{page}:SECTION", axes)
 
 
-_WAVE = ("nodal_diameter", "wave_number", "wave_kind")  # of the waves of an analysis of small vibrations
+_WAVE = ("nodal_diameter", "wave_number", "wave_kind")  # coordinates of analyses of small vibrations by waves
 
 
 def _waves(name: str, table: str, axes: tuple[str, ...] = ()) -> Home:
@@ -52,7 +52,7 @@ def _waves(name: str, table: str, axes: tuple[str, ...] = ()) -> Home:
     return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION", (*_WAVE, *axes))
 
 
-# names of the variables that position the entries of a dataset
+# names of the variables that become coordinates
 _HZ = ("frequency_hz",)
 _SYNTHESIS = ("frequency_hz", "backbone_frequency_hz", "direct_frequency_hz", "passage_frequency_hz")
 _RUN_UP = ("speed_rpm", "frequency_hz", "line_speed_rpm", "static_speed_rpm", "fast_speed_rpm")

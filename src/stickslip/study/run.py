@@ -1,4 +1,4 @@
-"""The runner: it works off the jobs of all analyses and writes each record to disk."""
+"""The runner: it executes the jobs of all analyses and writes each record to disk."""
 
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ from stickslip.study.store.worker_process import Limits, check_memory_limit
 from stickslip.study.store.workers import Hands, check_kind, executor
 from stickslip.study.verdict import together
 
-SHARE = 0.1  # of the time that a run may write what is not complete
+SHARE = 0.1  # largest fraction of a run's time for writing incomplete results
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Place:
     Parameters
     ----------
     workers
-        Number of processes; the numbers do not depend on it.
+        Number of processes; numerical results do not depend on it.
     kind
         Kind of executor, see `executor`.
     shard
@@ -86,16 +86,16 @@ def run_study(
     fresh: bool = False,
     checks: Sequence[str] = (),
 ) -> Outcome:
-    """Answer the questions of a study. An interrupted run continues with the unfinished jobs.
+    """Run the analyses of a study. An interrupted run continues with the unfinished jobs.
 
     Parameters
     ----------
     study
         A study from `read_study`.
     only
-        Names of the analyses to answer; all of the study if empty.
+        Names of the analyses to run; empty: all analyses of the study.
     workers, kind, shard
-        Place of execution of the jobs; see `Place`.
+        Where jobs are executed; see `Place`.
     fresh
         Delete earlier results and start again.
     checks
@@ -104,7 +104,7 @@ def run_study(
     Raises
     ------
     InputError
-        If the study, its files or its folder do not allow a run; raised before any long computation.
+        If the study, its files or its folder do not allow a run. It is raised before any long computation.
     Interrupted
         If the user stops the run; the message says how to continue.
     """
@@ -149,7 +149,7 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
 
 
 def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None) -> Outcome:
-    """Run one analysis on Python models without writing files; `given` are the tables of an equivalent study file, for the page."""
+    """Run one analysis on Python models without writing files; `given`: tables of an equivalent study file, for the page."""
     book = Book(Provenance(title, "", library_versions(), json.dumps(given or {}, default=str)))
     found = []
     for case in cases:
@@ -169,7 +169,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
     store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
     tasks = _tasks(study, asked, cases, checks, book.origin.versions)
-    # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
+    # tasks with the same input share a job; finished tasks of analyses that were not requested are shown, too
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
     to_do = _longest_first([t for t in unfinished.values() if t.analysis in asked])
     if place.shard is not None:
@@ -178,7 +178,7 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
     LOG.info(f"jobs to do: {len(to_do)}, answers: {sum(t.analysis in asked for t in tasks)}")
     files: list[Path] = []
     with _hands(to_do, place) as hands:
-        # all refusals come before any long computation, and before anything is given up
+        # all refusals come before any long computation, and before earlier results are deleted
         jobs = list(_orders(study, to_do, place, _labels(tasks)))
         if not fresh:
             _check_files(to_do)
@@ -213,10 +213,10 @@ def _run(study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, che
 
 
 def _tell_of_code(code: OwnCode, kept: Path) -> None:
-    """Log which code of the user runs, and which of it has changed since the last run in the folder."""
+    """Log the user's code that runs, and its changes since the last run in the folder."""
     try:
         before = dict(json.loads(kept.read_bytes()))
-    except (OSError, ValueError, TypeError):  # there is none, or it is damaged
+    except (OSError, ValueError, TypeError):  # the file is missing or damaged
         before = {}
     if not code.files and not before:
         return
@@ -245,7 +245,7 @@ def _refuse_result_of_another(study: Study) -> None:
 
 
 def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:
-    """Return a function that writes while jobs are left, for at most a tenth of the time, since results of many cases take long."""
+    """Return a function that writes while jobs are left, in at most a tenth of the time: results of many cases take long."""
     due = 0.0
 
     def wrote(left: int) -> None:
@@ -259,7 +259,7 @@ def _now_and_then(write: Callable[[], object]) -> Callable[[int], None]:
 
 
 def _longest_first(tasks: Iterable[Task]) -> list[Task]:
-    """Return tasks with the longest first: nonlinear before linear ones, and the harder a case is driven the earlier."""
+    """Return tasks with the longest first: nonlinear before linear, then in order of decreasing excitation."""
     return sorted(tasks, key=lambda t: (t.analysis.linear, -t.case.drive))
 
 
@@ -275,7 +275,7 @@ def _orders(study: Study, tasks: Sequence[Task], place: Place, labels: Mapping[P
 
 
 def _told(finished: Generator[Path], count: int, hands: Hands) -> Generator[Path]:
-    """Yield the files of finished jobs, and report how many there are while other machines, whose progress is not heard, do the rest."""
+    """Yield the files of finished jobs, and report their number if the jobs run on other machines, which report no progress."""
     with closing(finished):
         if hands.far:
             stage(f"{count} jobs are with the workers")
@@ -295,7 +295,7 @@ def _order(study: Study, task: Task, place: Place, label: str) -> Order:
 
 
 def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]:
-    """Return the executor of the jobs; jobs with limits and those of a shard run in a process of their own even one at a time."""
+    """Return the executor of the jobs; jobs with limits, and jobs of a shard, run in their own process even one at a time."""
     limits = [_limits(task) for task in tasks]
     for one in limits:
         check_memory_limit(one)
@@ -309,7 +309,7 @@ def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]
 def _tasks(
     study: Study, asked: Sequence[Analysis], cases: Sequence[Case], checks: frozenset[str], versions: Mapping[str, str]
 ) -> list[Task]:
-    """Return every case of every analysis of the study; only requested analyses get the checks."""
+    """Return a task for every case of every analysis of the study; only requested analyses get the checks."""
     found = []
     for own in asked_for(study):
         wanted = checks & frozenset(own.checks) if own in asked else frozenset()
@@ -318,7 +318,7 @@ def _tasks(
 
 
 def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]) -> Task:
-    """Return a task; the name of its file is the hash of everything its numbers depend on."""
+    """Return a task; the name of its file is the hash of everything that its results depend on."""
     layout = [f.name for f in fields(asked.record)]
     model = case.digest_at_rest if asked.linear else case.digest
     parts = [asked.name, asked.key(case), model, versions, layout]
@@ -328,14 +328,14 @@ def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]
 
 @contextmanager
 def of_task(study: Study, case: Case) -> Iterator[None]:
-    """Add the path of the study file, and the case if there are several, to input errors raised in the block."""
+    """Add the path of the study file, and the label of the case, to input errors raised in the block."""
     try:
         yield
     except InputError as error:
         place = f"{study.path} ({case.label})" if case.label else str(study.path)
         words = {"outside": "", "reach": "tolerance_m", "rim": f"tolerance_m = {TENFOLD}"}
         named = error.called(words)
-        # the model has named the file already
+        # errors of the model already name the file
         raise named.under(str(study.path), place) from None
 
 
@@ -362,7 +362,7 @@ def _label(asked: Analysis, case: Case) -> str:
 
 
 def _labels(tasks: Sequence[Task]) -> dict[Path, str]:
-    """Name each job by its analysis and its cases; a job that answers all cases bears no case."""
+    """Return the label of each job: its analysis and its cases; a job for all cases names no case."""
     cases: dict[Path, list[Task]] = {}
     for task in tasks:
         cases.setdefault(task.sealed, []).append(task)
@@ -377,7 +377,7 @@ def _labels(tasks: Sequence[Task]) -> dict[Path, str]:
 
 
 def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:
-    """Return the meshes of the parts of the first case, for drawings; none without meshio."""
+    """Return the meshes of the parts of the first case, for ParaView; empty if meshio is missing."""
     if find_spec("meshio") is None:
         return {}
     for case in cases:

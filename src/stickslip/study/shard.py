@@ -1,4 +1,4 @@
-"""Shares of the jobs of a run, for job arrays on a shared folder."""
+"""Shards, the shares of a run's jobs, for job arrays on a shared folder."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ class Shard:
     Parameters
     ----------
     number
-        From 1.
+        Number of this shard, from 1.
     count
         Number of shards.
     """
@@ -50,11 +50,11 @@ class Shard:
         return f"run-{self.number}-of-{self.count}.log"
 
     def own(self, tasks: Sequence[Task]) -> Sequence[Task]:
-        """Return its share of all tasks; every shard sorts the tasks in the same order."""
+        """Return the tasks of this shard; every shard sorts all tasks in the same order."""
         return tasks[self.number - 1 :: self.count]
 
     def outcome(self, book: Book, done: int, left: int, folder: Path) -> Outcome:
-        """Return the outcome of a shard that ends before others."""
+        """Return the outcome of a shard that ends while others still run."""
         text = (
             f"shard {self.number}/{self.count}: {done} jobs done, {left} of other shards are not. The last one to end puts the "
             "result together, as does the same command without --shard."

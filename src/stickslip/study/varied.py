@@ -1,4 +1,4 @@
-"""The varied keys of a study, from the dataset of an analysis."""
+"""Varied keys of a study, read from the dataset of an analysis."""
 
 from collections.abc import Mapping, Sequence
 
@@ -38,16 +38,16 @@ def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
 
 
 def key_name(data: xr.Dataset, key: str) -> tuple[str, str]:
-    """Return word and unit of a varied key, as names of cases tell it: ``force``, ``N``."""
+    """Return word and unit of a varied key, as in names of cases: ``force``, ``N``."""
     keys = varied_values(data)[0]
     return key_words(keys if key in keys else [key])[key]
 
 
 def families(data: xr.Dataset, key: str) -> dict[str, list[int]]:
-    """Group the cases that differ in `key` and in keys that run with it: name of a group -> its cases in the order of the study.
+    """Group the cases that differ only in `key` and keys that vary with it: name of a group -> its cases in the order of the study.
 
-    The name has the parts of the cases' names that the group shares; it is empty for a single group. A key runs with `key` if each value
-    of `key` has one of its values, and if numbers rise or fall together.
+    The name consists of the parts of the cases' names that the group has in common; it is empty for a single group. A key varies with
+    `key` if each value of `key` determines its value, and its numbers rise or fall with `key`.
     """
     keys, values = varied_values(data)
     along = values[:, keys.index(key)] if key in keys else np.zeros(len(values))
@@ -71,7 +71,7 @@ def _runs_with(along: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _shared_names(labels: Sequence[str], groups: Sequence[Sequence[int]]) -> list[str]:
-    """Return the parts of names that all cases of a group have, a text for each group."""
+    """Return for each group the parts of the names that all its cases have in common."""
     if len(groups) == 1 or not labels:
         return [""]
     parts = [label.split(JOINT) for label in labels]
@@ -81,5 +81,5 @@ def _shared_names(labels: Sequence[str], groups: Sequence[Sequence[int]]) -> lis
 
 
 def assigned_of(values: Mapping[str, object]) -> tuple[str, ...]:
-    """Return the varied keys of a case with their values, which a dataset holds as texts."""
+    """Return the varied keys of a case with their values as text: ``load.shaker.force_n = 3``."""
     return assignments({k: str(v) if np.isnan(as_number(v)) else as_number(v) for k, v in values.items()})

@@ -11,13 +11,13 @@ import numpy as np
 import xarray as xr
 
 Level = Literal["trusted", "doubtful", "wrong"]
-LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a dataset is its place
-UNSTABLE = "unstable"  # of a point: an answer, which a machine does not stay at
-POINT_LEVELS = (*LEVELS, UNSTABLE)  # numbers of the verdict on a point
-ATTRIBUTE = "verdicts"  # of the dataset of an analysis
-JOINT = ", "  # between the parts of a case's name, as `case_names` writes it
-WITH = " with "  # between the values of several parts
-ALIKE = 20  # characters that two verdicts of one kind share before their first number, at least
+LEVELS: tuple[Level, ...] = get_args(Level)  # datasets store the index of a level
+UNSTABLE = "unstable"  # verdict on a point: a correct solution at which a machine does not stay
+POINT_LEVELS = (*LEVELS, UNSTABLE)  # datasets store the index of the verdict on a point
+ATTRIBUTE = "verdicts"  # attribute of the dataset of an analysis
+JOINT = ", "  # separator of the parts of a case's name, as in `case_names`
+WITH = " with "  # separator between values of several parts
+ALIKE = 20  # smallest number of characters before the first number that verdicts of one kind have in common
 _NUMBER = re.compile(r"\d")
 INCOMPLETE = "the run is not complete"
 
@@ -62,12 +62,12 @@ class Verdict:
 
     @property
     def told(self) -> bool:
-        """Whether it is shown unasked: it is not trusted, or has a remedy or a warning."""
+        """Whether the verdict is shown by default: it is not trusted, or has a remedy or a warning."""
         return self.rank > 0 or self.warns or bool(self.remedy)
 
     @property
     def word(self) -> str:
-        """Word in front of it: its level, or ``warning`` or ``note`` for a trusted answer with a warning or a remedy."""
+        """Word before the sentence: the level, or ``warning`` or ``note`` for a trusted answer with a warning or a remedy."""
         if self.warns and not self.rank:
             return "warning"
         return "note" if self.told and not self.rank else self.level
@@ -113,7 +113,7 @@ def worst(levels: Iterable[Level]) -> Level:
 
 
 def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdict, ...]:
-    """Return verdicts in their order. One that is the same for several whole cases appears once, without a case."""
+    """Return verdicts in their order; a verdict that holds for every case appears once, without a case."""
     cases: dict[Verdict, list[str]] = {}
     for v in each:
         cases.setdefault(replace(v, case=""), []).append(v.case)
@@ -126,13 +126,13 @@ def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdic
 
 
 def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
-    """Return verdicts in reading order: wrong, doubtful, warnings, notes, trusted; within each in the order of the cases."""
+    """Return verdicts in reading order: wrong, doubtful, warnings, notes, trusted; equal ones in the order of the cases."""
     return sorted(verdicts, key=lambda v: (-v.rank, not v.warns, not v.told))
 
 
 def together(labels: Sequence[str]) -> str:
-    """Join names of cases to one line; the words that all begin with, and the parts that all have, are written once."""
-    if any(WITH in label for label in labels):  # of several cases already
+    """Join names of cases to one line; common first words and common parts are written once."""
+    if any(WITH in label for label in labels):  # a label that already joins several cases
         return "; ".join(labels)
     if len(labels) > 1 and any(JOINT in label for label in labels):
         return _by_parts([tuple(label.split(JOINT)) for label in labels])
@@ -145,7 +145,10 @@ def together(labels: Sequence[str]) -> str:
 
 
 def _by_parts(labels: Sequence[tuple[str, ...]]) -> str:
-    """Join names of cases of several parts: values of the parts that differ if these are all their combinations, then the parts that all have."""
+    """Join names that have several parts.
+
+    If the names are all combinations of their parts, return the values of each part that differs, then the common parts.
+    """
     plain = "; ".join(JOINT.join(parts) for parts in labels)
     if len({len(parts) for parts in labels}) > 1:
         return plain
@@ -158,7 +161,7 @@ def _by_parts(labels: Sequence[tuple[str, ...]]) -> str:
 
 
 def once(verdicts: Iterable[Verdict]) -> list[Verdict]:
-    """Return verdicts in their order; those that differ in nothing but the case become one, of all their cases."""
+    """Return verdicts in their order; verdicts that differ only in the case become one for all these cases."""
     cases: dict[Verdict, list[str]] = {}
     for v in verdicts:
         cases.setdefault(replace(v, case=""), []).append(v.case)
@@ -166,7 +169,10 @@ def once(verdicts: Iterable[Verdict]) -> list[Verdict]:
 
 
 def of_kinds(verdicts: Iterable[Verdict]) -> list[list[Verdict]]:
-    """Group verdicts by kind, the worst kind first, equal ones of several cases as one. Verdicts of a kind agree up to their first number; plain trusted cases form one kind."""
+    """Group verdicts by kind, the worst kind first; equal verdicts of several cases become one.
+
+    Verdicts of a kind agree up to their first number; plain trusted cases form one kind.
+    """
     kinds: dict[tuple[str, ...], list[Verdict]] = {}
     for v in worst_first(once(verdicts)):
         own: tuple[str, ...] = (v.word, _gist(v.why), _gist(v.remedy))
@@ -184,7 +190,10 @@ def likewise(others: Sequence[Verdict]) -> str:
 
 
 def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
-    """Return verdicts as lines, worst first: one line a kind with the places of the others, or with `every` one line a verdict that differs."""
+    """Return verdicts as lines, worst first: one line for each kind, with the places of all its verdicts.
+
+    With `every`, each different verdict has a line.
+    """
     if every:
         return [str(v) for v in worst_first(once(verdicts))]
     lines = []
@@ -215,7 +224,7 @@ def from_json(text: str) -> tuple[Verdict, ...]:
 def stored(attributes: Mapping[Any, Any]) -> tuple[Verdict, ...]:
     """Return the verdicts stored in the attributes of a dataset.
 
-    Results of early versions hold warnings as sentences instead; these become verdicts.
+    Results of early versions have warnings as sentences instead; these become verdicts.
     """
     if ATTRIBUTE in attributes:
         return from_json(str(attributes[ATTRIBUTE]))
@@ -238,7 +247,7 @@ def of_tree(tree: xr.DataTree) -> tuple[Verdict, ...]:
 
 
 def not_trusted(tree: xr.DataTree) -> str:
-    """Name in a line the analyses and cases that are doubtful or wrong; empty if all are trusted."""
+    """Return a line that names the doubtful and wrong analyses and cases; empty if all are trusted."""
     aside = len(stored(tree.attrs))
     each = [INCOMPLETE] * _incomplete(tree) + [f"{aside} of the jobs set aside"] * (aside > 0)
     each += [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
@@ -247,7 +256,7 @@ def not_trusted(tree: xr.DataTree) -> str:
 
 
 def conclusion(tree: xr.DataTree) -> str:
-    """Summarise a result in a line: `not_trusted`, or else the number of warnings and the single points that are not trusted."""
+    """Summarise a result in a line: `not_trusted`, or else the numbers of warnings and of single points that are not trusted."""
     told = not_trusted(tree)
     if told:
         return told
@@ -265,7 +274,7 @@ def conclusion(tree: xr.DataTree) -> str:
 
 
 def _not_judged(tree: xr.DataTree) -> str:
-    """Name the parts of questions that have no answer, with the remedy of each; empty for none."""
+    """Return a line that names the parts of questions without an answer, and their remedies; empty for none."""
     found: dict[str, list[str]] = {}
     for v in of_tree(tree):
         if v.not_judged:

@@ -1,1 +1,1 @@
-"""Results for other programs: fields on all nodes, states of contacts, response functions."""
+"""Export of results to other programs: fields on all nodes, states of contacts, response functions."""

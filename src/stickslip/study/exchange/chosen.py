@@ -12,7 +12,7 @@ from stickslip.reduction.waves import NO_WAVE
 from stickslip.study.store.netcdf import one_case
 from stickslip.units import HZ, millimetres
 
-ROUNDED = 1e-3  # of a number that was read from a table, relative
+ROUNDED = 1e-3  # relative rounding of a number that a user read from a table
 FORCED, MODE, CYCLE = "forced_response", "nonlinear_mode", "limit_cycle"
 
 
@@ -35,7 +35,7 @@ class Chosen:
     outputs, reported
         Names (k,) and motion (H+1, k) of the outputs, m.
     orders
-        Candidates for the highest harmonic of the assembled model.
+        Possible values of the highest harmonic of the assembled model.
     wave_number
         Wave number of a free motion of a tuned wheel; else None.
     free
@@ -89,9 +89,9 @@ def chosen(
     number
         Index of the nonlinear mode or limit cycle in the case, from 0.
     hz
-        Frequency at which a point of a forced response is chosen, the nearest one; None: the peak.
+        Frequency of the wanted point of a forced response; the nearest point is chosen. None: the peak.
     amplitude_mm
-        Amplitude at which a motion of a nonlinear mode is chosen, the nearest one; None: the motion with the highest damping.
+        Amplitude of the wanted motion of a nonlinear mode; the nearest motion is chosen. None: the motion with the highest damping.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.study.exchange.chosen import as_complex
 from stickslip.study.exchange.motion import Motion
 
-SLIP = 1  # word of `peak_state`
+SLIP = 1  # code of slip in `peak_state`
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Fields for CalculiX's viewer and other readers of ``.frd``: two result blocks a harmonic, real and imaginary part."""
+"""Fields for CalculiX's viewer and other readers of ``.frd``: for each harmonic a block of the real and of the imaginary part."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +16,7 @@ PER_LINE = 10  # nodes of an element in a line
 
 
 def write_frd(motion: Motion, path: Path, units: Units) -> Path:
-    """Write the motion of all nodes: the mean displacement at step 1, then a step a harmonic with ``DISP`` and ``DISPI``.
+    """Write the motion of all nodes: the mean displacement as step 1, then one step for each harmonic with ``DISP`` and ``DISPI``.
 
     Parameters
     ----------

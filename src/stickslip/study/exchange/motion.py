@@ -14,7 +14,7 @@ from stickslip.model.axis import Axis
 from stickslip.study.exchange.chosen import Chosen
 from stickslip.study.store.progress import LOG
 
-AGREE = 1e-6  # relative, of the outputs: the model is that of the result, not another one
+AGREE = 1e-6  # relative difference of the outputs, above which the model is not the one of the result
 CHANGED = "Files of the model have changed since the run, or the study has: run it again, then export."
 
 
@@ -27,7 +27,7 @@ class Body:
     nodes
         Nodes with positions.
     sector
-        Index from 0.
+        Index of the sector, from 0.
     amplitudes
         (H+1, n, 3) coefficients of ``u(t) = Re Σ U_h exp(i h ω t)`` in m along the global axes.
     """
@@ -67,7 +67,7 @@ class Motion:
     sectors
         Number of sectors described: 1 or all.
     lag
-        Fraction of the period by which a sector leads the one before it; None if each sector has a motion of its own.
+        Fraction of the period by which a sector leads the previous one; None if each sector has its own motion.
     axis
         Rotation axis of the wheel.
     pitch
@@ -95,7 +95,7 @@ def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
     model
         The model of its case.
     wheel
-        Whether all sectors are wanted instead of one; a mistuned wheel is always whole.
+        Whether to return all sectors instead of one; a mistuned wheel always has all.
 
     Raises
     ------
@@ -124,8 +124,11 @@ def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
 
 
 def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
-    """Return the assembled model with its expansion to all dofs, and the motion of all dofs of its sectors. The outputs must agree with the result."""
-    # how many modes the waves of a wheel keep may depend on the other waves
+    """Return the assembled model with its expansion to all dofs, and the motion of all dofs of its sectors.
+
+    The outputs must agree with the result.
+    """
+    # the number of modes kept for a wave may depend on the other waves, so other sets of waves are tried
     ways = [(chosen.orders[0], chosen.wave_number is not None)]
     if model.sectors > 1 and model.mistuning is None and not chosen.free:
         ways += [(chosen.orders[-1], False), (chosen.orders[-1], True)]
@@ -169,7 +172,7 @@ def _felt(chosen: Chosen) -> Felt:
 
 
 def _of_sector(whole: Everywhere, fields: ComplexArray, sector: int) -> ComplexArray:
-    """Return the motion (H+1, N) of a sector, in the axes of the first sector turned to it."""
+    """Return the motion (H+1, N) of a sector, in the axes of the first sector rotated to its position."""
     if not whole.alike:
         return np.asarray(fields[sector])
     phases = np.array([whole.phase(h, sector) for h in range(fields.shape[1])])
@@ -191,7 +194,7 @@ def _places(model: Model, whole: Everywhere) -> Iterator[tuple[str, tuple[int, s
 
 
 def numbers_of(motion: Motion) -> tuple[list[IntArray], list[IntArray]]:
-    """Return unique node and cell numbers of each body, from 1: those of the model's files if they are unique, else consecutive ones."""
+    """Return unique node and cell numbers of each body, from 1: the numbers in the model's files if unique, else consecutive ones."""
     nodes = [body.nodes.numbers for body in motion.bodies]
     cells = [body.nodes.cell_numbers for body in motion.bodies]
     return _once(nodes), _once([np.zeros(0, dtype=np.int64) if c is None else c for c in cells])

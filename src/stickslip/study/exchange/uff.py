@@ -15,14 +15,14 @@ from stickslip.study.store.atomic_write import whole_file
 
 SI = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
 DIRECTIONS = {name: k for k, name in enumerate(("x", "y", "z", "rx", "ry", "rz"), 1)}
-GENERAL, RESPONSE_FUNCTION = 0, 4  # of dataset 58
+GENERAL, RESPONSE_FUNCTION = 0, 4  # function types of dataset 58
 DISPLACEMENT, FORCE, FREQUENCY = 8, 13, 18  # specific data types
 NOWHERE = (0, "", 0)
-AT_FREQUENCY, TRANSLATIONS = 5, 2  # of dataset 55
+AT_FREQUENCY, TRANSLATIONS = 5, 2  # types of analysis and data in dataset 55
 
 
 def write_uff(motion: Motion, data: xr.Dataset | None, case: int, path: Path) -> Path:
-    """Write the nodes, one shape a harmonic, and the response of every output over frequency in each harmonic.
+    """Write the nodes, one shape for each harmonic, and the response of every output over frequency in each harmonic.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _shapes(motion: Motion, numbers: IntArray) -> Iterator[dict[str, Any]]:
 
 
 def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str, Any]]:
-    """Return the response of every output over frequency, per newton in the harmonics that loads drive."""
+    """Return the response of every output over frequency; harmonics that loads drive are per newton."""
     outputs = as_complex(data["output_displacement"].values)
     mine = (data["point_case"].values == case) & np.isfinite(outputs).any(axis=(1, 2))
     order = in_order(data, mine)
@@ -135,19 +135,19 @@ def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str
 
 
 def in_order(data: xr.Dataset, mine: BoolArray) -> IntArray:
-    """Return the points of a case by frequency; on a folded branch along the branch, without the added points at the peak."""
+    """Return the points of a case in order of frequency, or on a folded branch along the branch without points added at the peak."""
     points = np.flatnonzero(mine)
     branch = points[data["refinement"].values[points] == 0]
     steps = np.diff(data["frequency_hz"].values[branch])
     if np.all(steps > 0) or np.all(steps < 0):
         hertz = data["frequency_hz"].values[points]
-        written = [float(f"{f:.5e}") for f in hertz]  # digits of the format
+        written = [float(f"{f:.5e}") for f in hertz]  # frequencies may coincide with the digits of the format
         return np.asarray(points[np.unique(written, return_index=True)[1]])
     return np.asarray(branch)
 
 
 def _numbers(motion: Motion) -> Mapping[tuple[int, str, int], int]:
-    """Return the file's number of each node, by sector, part and own number."""
+    """Return the number of each node in the file, by sector, part and number in the model."""
     found: dict[tuple[int, str, int], int] = {}
     for body, numbers in zip(motion.bodies, numbers_of(motion)[0], strict=True):
         own = zip(body.nodes.numbers, numbers, strict=True)

@@ -1,4 +1,4 @@
-"""Fields for ParaView: one ``.vtu`` an instant, a ``.pvd`` with their times, and one file with the harmonics."""
+"""Fields for ParaView: one ``.vtu`` for each instant, a ``.pvd`` with their times, and one file with the harmonics."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -61,7 +61,7 @@ def write_vtu(motion: Motion, contacts: Sequence[ContactMotion], folder: Path, s
 
 
 def _harmonics(motion: Motion, mean: FloatArray) -> dict[str, FloatArray]:
-    """Return the complex amplitude of each harmonic, its size, and the mean displacement."""
+    """Return the complex amplitude of each harmonic, its absolute value, and the mean displacement."""
     found = {"mean_m": mean}
     for h in (h for h in motion.harmonics if h > 0):
         own = np.vstack([body.amplitudes[h] for body in motion.bodies])
@@ -74,7 +74,7 @@ def _harmonics(motion: Motion, mean: FloatArray) -> dict[str, FloatArray]:
 
 
 def _each(motion: Motion, values: Sequence[Any]) -> IntArray:
-    """Return one number a node from a value of its body; texts are numbered in their order."""
+    """Return for each node the value of its body as a number; texts are numbered in the order of occurrence."""
     known = {value: k for k, value in enumerate(dict.fromkeys(values))}
     own = [known[v] if isinstance(v, str) else int(v) for v in values]
     return np.repeat(own, [len(b.nodes.points) for b in motion.bodies])

@@ -1,4 +1,4 @@
-"""Short names of cases: the shortest text that tells them apart, with units."""
+"""Short names of cases: the shortest text, with units, that distinguishes them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from typing import Any
 from stickslip.study.file.suffixes import split_units
 
 Values = Mapping[str, Any]  # varied key -> value
-JOINT = ", "  # between the parts of a name
-DIGITS, MOST_DIGITS = 6, 17  # of a number: usually, and all that it has
+JOINT = ", "  # separator of the parts of a name
+DIGITS, MOST_DIGITS = 6, 17  # usual and largest number of digits of a value
 
 
 @dataclass(frozen=True)
 class Naming:
-    """How names tell a varied key: its word, its unit, and the digits of its values."""
+    """Format of a varied key in names: its word, its unit, and the digits of its values."""
 
     word: str
     unit: str
@@ -21,14 +21,14 @@ class Naming:
 
 
 def short_names(tables: Sequence[Sequence[Values]]) -> dict[str, Naming]:
-    """Return the naming of each varied key that a name needs: ``load.shaker.force_n`` -> ``force``, ``N``.
+    """Return the naming of each varied key that names need: ``load.shaker.force_n`` -> ``force``, ``N``.
 
-    Of keys that run together only the first one is needed that tells their values apart, else all.
+    Among keys that vary together, the first one whose values all differ is enough; without such a key all are needed.
 
     Parameters
     ----------
     tables
-        For each table of [vary] its rows of values.
+        Rows of values for each table of [vary].
     """
     words = key_words([key for rows in tables for key in _telling(rows)])
     column = {key: [row[key] for row in rows] for rows in tables for key in _telling(rows)}
@@ -36,7 +36,7 @@ def short_names(tables: Sequence[Sequence[Values]]) -> dict[str, Naming]:
 
 
 def key_words(keys: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Return word and unit of each key: ``load.shaker.force_n`` -> ``force``, ``N``; of keys with one word also the tables above."""
+    """Return word and unit of each key: ``load.shaker.force_n`` -> ``force``, ``N``; equal words get the names of their tables."""
     split = {key: split_units(key.rpartition(".")[2]) for key in keys}
     words = {key: own.replace("_", " ") for key, (own, _) in split.items()}
     above = 1
@@ -54,9 +54,9 @@ def short_name(values: Values, names: Mapping[str, Naming]) -> str:
     Parameters
     ----------
     values
-        Its varied keys with their values.
+        Varied keys of the case with their values.
     names
-        What `short_names` found.
+        Result of `short_names`.
     """
     return JOINT.join(
         " ".join(filter(None, (own.word, written(values[key], own.digits), own.unit)))
@@ -66,7 +66,7 @@ def short_name(values: Values, names: Mapping[str, Naming]) -> str:
 
 
 def written(value: Any, digits: int = DIGITS) -> str:
-    """Return a varied value as text, with so many digits of a number."""
+    """Return a varied value as text; numbers have `digits` digits."""
     return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
 
 
@@ -89,6 +89,6 @@ def _told_apart(values: Sequence[Any], digits: int) -> int:
 
 
 def _digits(values: Sequence[Any]) -> int:
-    """Return the fewest digits with which values differ as texts where they differ as numbers."""
+    """Return the smallest number of digits with which different numbers have different texts."""
     every = _told_apart(values, MOST_DIGITS)
     return next((n for n in range(DIGITS, MOST_DIGITS) if _told_apart(values, n) == every), MOST_DIGITS)

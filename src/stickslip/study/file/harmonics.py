@@ -15,10 +15,10 @@ from stickslip.study.file.own import own_object
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 from stickslip.study.own_code import is_address, made, of_address
 
-HIGHEST = 200  # harmonic that a study may keep
+HIGHEST = 200  # highest harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
-SAMPLES_A_HARMONIC = 8  # of a period, at least
-MEMBERS = ("judge", "threshold", "verifies")  # of a strategy
+SAMPLES_A_HARMONIC = 8  # smallest number of samples of a period over the highest harmonic
+MEMBERS = ("judge", "threshold", "verifies")  # required attributes of a strategy
 PLACES = ("answer", "along", "outputs", "contacts")
 
 Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
@@ -26,19 +26,19 @@ Kept = Harmonic | list[Harmonic]
 
 
 def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
-    """Return a strategy that Python gives as it is; names and module paths are checked."""
+    """Return a strategy: objects from Python unchanged, names and module paths after a check."""
     if is_address(given):
         own_object(info, given, "strategy", MEMBERS, instance=True)
         return given
     plain = given is None or isinstance(given, str | int | float | list | dict)
-    return check(given) if plain else given  # what an object lacks is said by `check_strategy`
+    return check(given) if plain else given  # `check_strategy` reports missing attributes of an object
 
 
 Selection: Any = Annotated[Literal[SELECTIONS], WrapValidator(_named_or_own)]
 
 
 class Harmonics(Section):
-    """Harmonics kept, and what chooses them at each frequency."""
+    """Harmonics that are kept, and their selection at each frequency."""
 
     low: Kept = Field(
         1,
@@ -135,7 +135,7 @@ class Harmonics(Section):
 
     @property
     def high_harmonics(self) -> Support:
-        """Harmonics of the reference, from 0; with ``auto`` those of the published method, or those of the first passage if there are more."""
+        """Harmonics of the reference, from 0; with ``auto`` the published set, or the set of the first passage if it is larger."""
         if self.high == "auto":
             return harmonics_of(max(PUBLISHED, self.low_harmonics[-1]))
         return harmonics_of(self.high)
@@ -149,7 +149,7 @@ class Harmonics(Section):
 
     @property
     def strategy(self) -> Any:
-        """The strategy that chooses harmonics, with the threshold of this table if it has one."""
+        """The strategy that chooses harmonics, with the threshold of this table if given."""
         if self.own_strategy is not None:
             return self.own_strategy
         from stickslip.harmonic.selection import strategy_named  # loads the contact kernels
@@ -176,9 +176,9 @@ def _harmonic(given: Any) -> bool:
 def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
     low, high = table.low_harmonics, table.high_harmonics
     if table.high == "auto":
-        pass  # holds all up to its highest
+        pass  # contains all harmonics up to its highest
     elif "low" not in table.model_fields_set and isinstance(table.high, list):
-        pass  # the loads say what it has to hold
+        pass  # the loads define which harmonics it must contain
     elif isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
         yield custom_error(f"must not be below low = {table.low}, got {table.high}", "Raise it, or lower low.", "high")
     elif not set(low) <= set(high):
@@ -251,7 +251,7 @@ def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
     elif given:
         try:
             _ = table.strategy
-        except InputError as error:  # a strategy's own limits
+        except InputError as error:  # limits of the strategy itself
             key = "alert_threshold_percent" if verifies else "strategy_threshold"
             yield custom_error(error.problem, error.remedy, key)
 

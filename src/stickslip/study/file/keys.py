@@ -11,8 +11,8 @@ from stickslip.study.file.model.contacts import keys_of
 from stickslip.study.file.tables import study_tables
 
 REQUIRED = "required"
-_ANY_NAME = "NAME"  # of a table that the user names
-_LONGEST = 24  # characters of a default that a cell shows
+_ANY_NAME = "NAME"  # stands for the user's name of a table
+_LONGEST = 24  # largest number of characters of a default in a cell
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def tables_of_file() -> Keys:
 
 
 def table_keys(name: str) -> list[Keys]:
-    """Return the keys of a table, one entry for each kind of it.
+    """Return the keys of a table, one entry for each of its kinds.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def table_keys(name: str) -> list[Keys]:
 
 
 def _table_of(schema: Mapping[str, Any], word: str) -> str:
-    """Name the table to which a kind belongs, or a table with a similar name."""
+    """Return the name of the table to which a kind belongs, or a hint at a table with a similar name."""
     if word in list(ALL_LAWS):
         return f"It is a law of contacts: 'stickslip keys contact.{word}'."
     for table, entry in schema["properties"].items():

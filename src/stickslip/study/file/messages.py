@@ -1,4 +1,4 @@
-"""Errors of pydantic as sentences with file, key, value and remedy."""
+"""Errors of pydantic, converted to sentences with file, key, value and remedy."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ def told(
     error
         Error of pydantic.
     renamed
-        Keys written elsewhere in the file: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
+        Key in the tables -> key in the file, if they differ: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
     """
     every = [one for details in error.errors(include_url=False) for one in _each(details)]
     found = (_told(place, model, one, renamed or {}) for one in _unknown_first(model, every))
@@ -55,7 +55,7 @@ def told(
 
 
 def _unknown_first(model: type[BaseModel], every: Sequence[ErrorDetails]) -> list[ErrorDetails]:
-    """Return unknown keys before missing ones, without a missing key that is the correct spelling of an unknown one."""
+    """Return unknown keys before missing ones; a missing key that an unknown one misspells is left out."""
     unknown = [one for one in every if one["type"] == "extra_forbidden"]
     rest = [one for one in every if one["type"] != "extra_forbidden"]
     spots = [spot_at(model, _path(one)) for one in unknown]
@@ -104,13 +104,13 @@ def _told(place: str, model: type[BaseModel], details: ErrorDetails, renamed: Ma
 
 
 def spot_at(model: type[BaseModel], path: Sequence[str | int]) -> Spot:
-    """Return the place of a pydantic path: tags of unions are left out, positions in lists are in brackets."""
+    """Return the place of a pydantic path, without tags of unions and with list positions in brackets."""
     here: Any = model
     keys: list[str] = []
     owner, about = None, NO_ABOUT
     for part in path:
         here, owns = _opened(here, part)
-        if owns is None:  # the name of an alternative, which is no key of the file
+        if owns is None:  # the tag of a union, which is no key of the file
             continue
         if isinstance(part, int):
             keys[-1:] = [f"{keys[-1] if keys else ''}[{part}]"]
@@ -123,7 +123,7 @@ def spot_at(model: type[BaseModel], path: Sequence[str | int]) -> Spot:
 
 
 def _opened(here: Any, part: str | int) -> tuple[Any, type[BaseModel] | bool | None]:
-    """Return the annotation under the part of a path, and the table that holds it; None instead of the annotation if the part is the tag of a union."""
+    """Return the annotation under the part of a path, and its table; the table is None if the part is the tag of a union."""
     tagged = alternatives(here)
     if part in tagged:
         return tagged[str(part)], None
@@ -183,7 +183,7 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
 
 
 def _one_of(word: str, known: list[str], about: str) -> str:
-    """Return the word probably meant, or all known words with their meanings if the list alone is not enough."""
+    """Return the word that was probably meant, or else all known words, with their meanings if the list does not explain itself."""
     remedy = did_you_mean(word, known)
     listed = about == NO_ABOUT or about.endswith(", ".join(known))
     return remedy if listed or not remedy.startswith("Known: ") else f"{remedy} It means: {about}."

@@ -16,14 +16,14 @@ def own_object(info: ValidationInfo, address: str, kind: str, members: Sequence[
     Parameters
     ----------
     info
-        Validation at work; its context has the `OwnCode` of the study under ``code``.
+        Current validation; its context has the `OwnCode` of the study under ``code``.
     address, kind, members, instance
         As for `OwnCode.at`.
 
     Raises
     ------
     PydanticCustomError
-        As `OwnCode.at`; also for an address given in Python, where the object itself is meant.
+        As `OwnCode.at`; also for an address given in Python, where the object itself is expected.
     """
     code: OwnCode | None = (info.context or {}).get("code")
     if code is None:

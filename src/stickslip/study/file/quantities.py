@@ -1,4 +1,4 @@
-"""Tables made from dataclasses: the fields of the dataclass define keys, units, ranges and defaults."""
+"""Tables made from dataclasses, whose fields define keys, units, ranges and defaults."""
 
 from collections.abc import Collection
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -42,7 +42,7 @@ def table_of(
     name: str = "",
     **more: Column,
 ) -> type[Section]:
-    """Return the pydantic table of a dataclass with quantity fields; it applies the checks of the dataclass.
+    """Return the pydantic table of a dataclass with quantity fields; it includes the checks of the dataclass.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def table_of(
     without
         Fields that are not keys.
     optional
-        Fields that may be left out in the file because their values come from elsewhere.
+        Fields that are optional in the file, because their values may come from elsewhere.
     name
         Name of the table's class; empty: the name of `cls`.
     more
@@ -80,7 +80,7 @@ def table_of(
 def columns_of(
     cls: type, *, without: Collection[str] = (), optional: Collection[str] = (), per_area: bool = False
 ) -> dict[str, Any]:
-    """Return the keys of the quantities of a dataclass, each with annotation and pydantic field."""
+    """Return the keys of a dataclass's quantities, each with annotation and pydantic field."""
     hints = get_type_hints(cls)
     return {
         q.key_of(entry.name, per_area=per_area): _column(entry, q, hints[entry.name], entry.name in optional, per_area)
@@ -97,7 +97,7 @@ def quantities_of(cls: type) -> tuple[tuple[Field[Any], Quantity], ...]:
 
 
 def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) -> Any:
-    """Return the dataclass of a table, in SI units; fields in `given` replace those of the table or add to them."""
+    """Return the dataclass of a table, in SI units; fields in `given` replace or supplement the table's fields."""
     hints = get_type_hints(cls)
     for entry, q in quantities_of(cls):
         if entry.name in given:
@@ -106,7 +106,7 @@ def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) ->
         if value is not None:
             given[entry.name] = _in_si(value, q, hints[entry.name])
         elif _inner(hints[entry.name]) is not hints[entry.name] and is_dataclass(_inner(hints[entry.name])):
-            given[entry.name] = None  # a table that is left out is not there
+            given[entry.name] = None  # an omitted table
     return cls(**given)
 
 
@@ -119,7 +119,7 @@ def refused_by(cls: type, make: Any) -> Any:
 
 
 def key_path(cls: type, argument: str) -> str:
-    """Return the keys of the field ``a.b`` of a dataclass; empty for an unknown field."""
+    """Return the key path of the field ``a.b`` of a dataclass; empty for an unknown field."""
     keys = []
     for name in filter(None, argument.split(".")):
         found = {entry.name: q for entry, q in quantities_of(cls)} if is_dataclass(cls) else {}

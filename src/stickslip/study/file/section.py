@@ -1,4 +1,4 @@
-"""The base of all study tables."""
+"""The base class of all study tables."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite
@@ -7,9 +7,9 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-_NO_NAME = "/\\:*?[]<>|\"'`$"  # what is no part of a file's name everywhere
-LARGEST_NUMBER = 1e30  # in the units of the file: ten of them multiplied, or ten of their inverses, are still numbers
-LONGEST_VALUE = 60  # characters of a value that a message shows
+_NO_NAME = "/\\:*?[]<>|\"'`$"  # characters that some systems do not allow in file names
+LARGEST_NUMBER = 1e30  # in the units of the file: products of ten such numbers or inverses do not overflow
+LONGEST_VALUE = 60  # largest number of characters of a value in a message
 
 Positive = Annotated[float, Field(gt=0)]
 FilePath = Annotated[str, Field(min_length=1, max_length=500)]  # relative to the study's folder
@@ -27,7 +27,7 @@ Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_plain
 
 
 class Section(BaseModel):
-    """A table of the study file: unknown keys, quiet conversions, and numbers that are not finite or that no quantity has are refused."""
+    """A table of the study file. Unknown keys, silent conversions, and numbers that are not finite or implausibly large are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -61,13 +61,13 @@ def _is_usual(size: float) -> bool:
 
 
 def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomError:
-    """Return the error for a validator of this package to raise; `key` names the key at fault if the validator checks a whole table."""
+    """Return the error that validators of this package raise; `key` names the wrong key if the validator checks a whole table."""
     context = {"problem": problem, "remedy": remedy, "key": key}
     return PydanticCustomError("stickslip", "{problem}. {remedy}", context)
 
 
 def refuse_all(errors: Iterable[PydanticCustomError]) -> None:
-    """Raise one error with all `errors`, since a validator can raise only once; nothing for no errors."""
+    """Raise one error that contains all `errors`, if there are any; a validator can raise only once."""
     found = list(errors)
     if found:
         first, *others = [dict(error.context or {}) for error in found]
@@ -79,7 +79,7 @@ def shown(value: object) -> str:
     """Return `value` as shown in messages, shortened if long."""
     try:
         text = repr(value)
-    except ValueError:  # Python writes no number of thousands of digits
+    except ValueError:  # Python refuses to write a number of thousands of digits
         return "a number of thousands of digits"
     except RecursionError:
         return "what is nested too deeply to be shown"

@@ -1,4 +1,4 @@
-"""The study file: TOML, validated as a whole for each case of [vary]."""
+"""The study file: TOML that is validated as a whole for each case of [vary]."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,9 +22,9 @@ class TablesOfCase:
     Parameters
     ----------
     label
-        Its name, in [vary] or the shortest that tells the cases apart; empty for a study without [vary].
+        Name of the case: from [vary], or the shortest text that distinguishes the cases; empty for a study without [vary].
     values
-        Varied key -> its value here.
+        Varied key -> its value in this case.
     tables
         The validated tables.
     """
@@ -41,7 +41,7 @@ class StudyFile:
     Parameters
     ----------
     path
-        Path of the file, as messages name it.
+        Path of the file for messages.
     text
         Text of the file, kept for the provenance of results.
     raw
@@ -70,7 +70,7 @@ class StudyFile:
 
 
 def read_file(path: Path, *, allow_code: bool = False) -> StudyFile:
-    """Read and validate a study file; `allow_code`: it may name modules of the user, which are imported.
+    """Read and validate a study file; with `allow_code` it may name modules of the user, which are then imported.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read_file(path: Path, *, allow_code: bool = False) -> StudyFile:
 
 
 def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[TablesOfCase, ...]:
-    """Return the tables of each case of a file's content, which may name `code` of the user.
+    """Return the tables of each case of a file's content; the file may name the user's `code`.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
     for case in cases:
         try:
             found.append(_case(path, raw, case, code))
-        except InputError as error:  # what is wrong in many cases is told once
+        except InputError as error:  # an error that occurs in many cases is reported once
             errors |= {str(one): one for one in error.each()}
     if errors:
         raise together(errors.values())
@@ -106,7 +106,7 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
 
 
 def _of_replaced(path: Path, raw: Mapping[str, Any], code: OwnCode) -> list[InputError]:
-    """Return what is wrong with values that [vary] replaces in every case: nobody would see that they are never used."""
+    """Return errors about values that [vary] replaces in every case, which would otherwise never be checked."""
     varied = {f"{path}: {key}" for key in varied_keys(str(path), raw)}
     given = {key for key in varied if value_at(raw, key.removeprefix(f"{path}: ")) is not None}
     if not given:

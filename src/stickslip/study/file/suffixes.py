@@ -6,7 +6,7 @@ from math import isclose, pi
 
 from stickslip.errors import did_you_mean, nearest
 
-Powers = tuple[int, int, int, int]  # of length, mass, time and angle
+Powers = tuple[int, int, int, int]  # exponents of length, mass, time and angle
 
 _BASES: dict[str, tuple[str, float, Powers]] = {  # ending: symbol, size in SI, powers
     "m": ("m", 1.0, (1, 0, 0, 0)),
@@ -38,7 +38,7 @@ _BASES: dict[str, tuple[str, float, Powers]] = {  # ending: symbol, size in SI, 
 }
 _PERCENT = ("%", 1e-2, (0, 0, 0, 0))
 _EXPONENTS = {"": "", "2": "²", "3": "³", "4": "⁴", "5": "⁵"}
-_LONGEST_LIST = 6  # values that a message converts
+_LONGEST_LIST = 6  # largest number of values that a message converts
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,8 @@ def _split(key: str) -> Iterator[tuple[str, Unit]]:
 def nearest_key(word: str, known: Sequence[str], value: object = None) -> str:
     """Return the remedy for an unknown key.
 
-    It names the known key that has the same name and another unit, and converts the value. Without such a key it names the nearest one.
+    The remedy names the known key with the same name and another unit, and converts the value. Without such a key it names the most
+    similar one.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def meant_key(word: str, known: Sequence[str]) -> str:
 
 
 def _in_another_unit(word: str, known: Sequence[str]) -> tuple[str, Unit, Unit] | None:
-    """Return the known key of the same name in another unit, with the given unit and its own."""
+    """Return the known key with the same name and another unit, the given unit, and the unit of the known key."""
     for name, given in _split(word):
         for key in known:
             for other, meant in _split(key):
@@ -140,7 +141,7 @@ def _in_another_unit(word: str, known: Sequence[str]) -> tuple[str, Unit, Unit] 
 
 
 def _converted(given: Unit, meant: Unit, value: object) -> str:
-    """Return a value, or one unit, in another unit; empty for a key without a unit."""
+    """Return a sentence that converts a value, or one unit, to another unit; empty for a key without a unit."""
     if not given.symbol:
         return ""
     factor = given.size / meant.size

@@ -20,7 +20,7 @@ from stickslip.study.questions import ANALYSES, loaded
 
 
 class Measured(Section):
-    """Measured peaks, drawn over the optimisation curves with their error bars."""
+    """Measured peaks, drawn with error bars over the optimisation curves."""
 
     file: FilePath = Field(
         description="CSV file of the measured peaks: a column named like the varied key, and columns such as peak_amplitude_um, "
@@ -52,7 +52,7 @@ OF_THE_MODEL = frozenset(
 
 
 class Solver(Section):
-    """How contact forces are computed, and how much is done for a frequency that does not converge."""
+    """Computation of contact forces, and the effort for a frequency that does not converge."""
 
     evaluator: Evaluator = Field(
         "events",
@@ -71,7 +71,7 @@ class Solver(Section):
 
 
 class Tables(Section):
-    """Everything a study file may hold, but for the tables of the analyses."""
+    """All tables of a study file except the tables of the analyses."""
 
     schema_version: Literal[2] = Field(description="schema_version = 2, the version of the file's layout")
     title: str = Field("", max_length=200, description="a title of one line")
@@ -91,7 +91,7 @@ class Tables(Section):
     mistuning: dict[Name, MistuningTable] = Field(
         default_factory=dict, description="the tables [mistuning.NAME], of what differs from sector to sector"
     )
-    output: Output = Field(  # validated even if left out: its folder may be a link that leads elsewhere
+    output: Output = Field(  # validated even if omitted: its default folder may be a link that leads elsewhere
         {}, validate_default=True, description="the table [output]"
     )
     harmonics: Harmonics = Field(default_factory=Harmonics, description="the table [harmonics]")
@@ -108,7 +108,7 @@ class Tables(Section):
 
 @cache
 def study_tables() -> type[Tables]:
-    """Return the section of the whole file, with one optional table for each analysis."""
+    """Return the class of the whole file, with one optional table for each analysis."""
     asked: dict[str, Any] = {
         name: (loaded(home.table) | None, Field(None, description=f"the table [{name}]"))
         for name, home in ANALYSES.items()

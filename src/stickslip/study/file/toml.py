@@ -1,4 +1,4 @@
-"""TOML of limited size and depth."""
+"""TOML files of limited size and depth."""
 
 import re
 import tomllib
@@ -9,11 +9,11 @@ from typing import Any
 from stickslip.errors import InputError, input_error
 
 LARGEST_FILE = 1_000_000  # bytes
-MOST_PARTS = 20  # of a key, between dots: our longest have five
+MOST_PARTS = 20  # parts of a key between dots: our longest keys have five
 MOST_TABLES = 2000  # parts, contacts, loads and their tables
-MOST_KEYS = 5000  # with a value
-DEEPEST = 20  # lists or tables within each other: ours go to four
-MOST_DIGITS = 400  # of a number: the largest that a computer holds has 309
+MOST_KEYS = 5000  # keys with a value
+DEEPEST = 20  # levels of nested lists or tables: ours have four
+MOST_DIGITS = 400  # digits of a number: the largest double has 309
 
 _TEXTS = re.compile(
     r"""\"{3}(?:[^\\]|\\.)*?\"{3} | '{3}.*?'{3} | "(?:[^"\\\n]|\\.)*" | '[^'\n]*' | \#[^\n]*""", re.DOTALL | re.VERBOSE
@@ -48,7 +48,7 @@ def parsed(text: str, path: Path) -> dict[str, Any]:
     _check_size(path, text)
     try:
         return tomllib.loads(text)
-    # the parser leaves impossible dates and numbers to the types that they become
+    # impossible dates and numbers raise the ValueError of their types, not of the parser
     except (ValueError, RecursionError) as error:
         raise _no_toml(path, text, str(error)) from None
 
@@ -69,7 +69,7 @@ def _text(path: Path) -> str:
         if len(content) > LARGEST_FILE:
             raise input_error(place, f"is larger than {LARGEST_FILE} bytes", "A study file is a few kilobytes of TOML.")
         # TOML allows both line ends; one form keeps hashes and provenance the same
-        return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors mark UTF-8
+        return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors write a byte-order mark
     except OSError as error:
         raise input_error(place, f"cannot be read ({error.strerror})", "Check its permissions.") from None
     except UnicodeDecodeError as error:
@@ -77,7 +77,7 @@ def _text(path: Path) -> str:
 
 
 def _check_size(path: Path, text: str) -> None:
-    # keys, brackets and digits count outside of texts and comments alone
+    # keys, brackets and digits are counted only outside texts and comments
     bare = _TEXTS.sub(lambda found: "x" * (found[0][0] != "#"), text)
     if (found := _KEY.search(bare)) is not None:
         raise _too_large(path, bare, found.start(), f"has a key of more than {MOST_PARTS} parts")

@@ -1,4 +1,4 @@
-"""The table [vary]: any key of the file becomes a list; lists of one table run together, several tables multiply."""
+"""The table [vary] gives lists of values for any key; lists of one table vary together, several tables are combined."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from stickslip.study.file.section import shown
 from stickslip.study.file.suffixes import nearest_key
 
 MOST_CASES = 1000
-NAME = "name"  # the key of [vary] that names its cases
+NAME = "name"  # key of [vary] with the names of its cases
 NAMED = 'For example name = ["light", "heavy"].'
 EXAMPLE = "For example [vary] with load.shaker.ratio = [100, 20]."
 
@@ -47,7 +47,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     Raises
     ------
     InputError
-        If a key does not exist, is no list, lists of one table differ in length, or two cases have one name.
+        If a key does not exist or is no list, lists of one table differ in length, or two cases have the same name.
     """
     given = raw.get("vary")
     if given is None:
@@ -81,7 +81,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
 
 
 def with_values(raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False) -> dict[str, Any]:
-    """Return the content of a file with other values of some keys; [vary] is removed if it is not kept."""
+    """Return the content of a file with other values of some keys; [vary] is removed unless `keep_vary`."""
     content = {k: v for k, v in deepcopy(dict(raw)).items() if keep_vary or k != "vary"}
     for key, value in values.items():
         *tables, last = key.split(".")
@@ -98,7 +98,7 @@ def refuse_varied(place: str, raw: Mapping[str, Any], values: Mapping[str, Any])
     Raises
     ------
     InputError
-        Naming each key, and how to give it another list or none.
+        If there are such keys; the message names each, and how to replace or remove its list.
     """
     varied = varied_keys(place, raw)
     errors = [
@@ -148,7 +148,7 @@ def _flat(
 
 
 def _wrong_names(place: str, table: Mapping[str, Any], lists: Mapping[str, Sequence[Any]]) -> Iterator[InputError]:
-    """Yield what is wrong with the names of a table's cases."""
+    """Yield errors about the names of a table's cases."""
     names, count = table.get(NAME, []), len(next(iter(lists.values()), ()))
     if NAME in table and not (isinstance(names, list) and all(isinstance(n, str) and n.strip() for n in names)):
         yield input_error(f"{place}: vary.{NAME}", f"must be a list of texts, got {shown(names)}", NAMED)
@@ -178,12 +178,12 @@ def _wrong(
 
 
 def _unknown(place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[InputError]:
-    """Return the error about an unknown key."""
+    """Return the error about an unknown key, in a list; an empty list for a known key."""
     content: Any = raw
     here: Any = model
     for i, name in enumerate(key.split(".")):
         if alternatives(here) and not _chosen(here, content):
-            return []  # the table is refused itself, since nothing says of which kind it is
+            return []  # the table has its own error, since its kind is unknown
         known, here = _below(here, content, name)
         if name not in known or (i == 0 and name in ("vary", "schema_version", "title")):
             return [input_error(f"{place}: vary.{key}", f"there is no key {name!r}", nearest_key(name, known))]

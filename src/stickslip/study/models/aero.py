@@ -20,7 +20,7 @@ WHO = ("neighbour", "recorded_on", "wave_number", "phase_angle_deg")
 UNIT_MASS, SCALED, POINTS = "per_s2", "j", "n_per_m"  # units of the coefficients
 BETWEEN = {False: ("force_mode", "motion_mode"), True: ("force_point", "motion_point")}
 WORDS = ("note", "comment")
-WHOLE = 1e-9  # by which a whole number may be off
+WHOLE = 1e-9  # largest deviation from a whole number
 
 
 def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
@@ -45,12 +45,12 @@ def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[I
 
 
 def knows_speeds(table: AeroTable | None, home: Path) -> bool:
-    """Return whether the coefficients are tabulated over speed; True for an unreadable file."""
+    """Whether the coefficients are tabulated over speed; True for an unreadable file."""
     if table is None:
         return False
     try:
         return "speed_rpm" in _columns(home / table.file).names
-    except InputError:  # which is told where it belongs
+    except InputError:  # reported by another check
         return True
 
 
@@ -75,7 +75,7 @@ def aerodynamics_of(
     Raises
     ------
     InputError
-        Naming file, line, column and value.
+        If the file cannot be used; the message names file, line, column and value.
     """
     path = home / table.file
     columns = _columns(path)
@@ -169,7 +169,7 @@ def _check_names(columns: MeasuredColumns, table: AeroTable) -> None:
 
 
 def _between(columns: MeasuredColumns, table: AeroTable) -> tuple[list[Any], list[tuple[int, int]]]:
-    """Return the modes or points, and for each row the one that moves and the one that the force acts on."""
+    """Return the modes or points, and for each row the one that moves and the one on which the force acts."""
     ends = BETWEEN[bool(table.points)]
     if ends[0] not in columns.names:
         if len(table.points) > 1:
@@ -260,8 +260,8 @@ def _whole(columns: MeasuredColumns, name: str, least: int | None = None) -> Flo
 def _refuse_gaps(
     columns: MeasuredColumns, line: IntArray, who: str, once: FloatArray, speeds: FloatArray, frequencies: FloatArray
 ) -> None:
-    """Refuse a table in which a coefficient is missing at a speed, frequency or neighbour that others have."""
-    there = (line >= 0).any(axis=(0, 1, 2))  # pairs that are nowhere are zero
+    """Refuse a table in which a coefficient is missing at a speed, frequency or neighbour that other coefficients have."""
+    there = (line >= 0).any(axis=(0, 1, 2))  # pairs that never occur are zero
     gaps = np.argwhere((line < 0) & there)
     if not gaps.size:
         return

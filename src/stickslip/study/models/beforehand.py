@@ -1,4 +1,4 @@
-"""Size and time of ``stickslip check``, told before anything is read and before heavy libraries are imported."""
+"""Estimated size and time of ``stickslip check``, before files are read and heavy libraries are imported."""
 
 from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables
@@ -7,7 +7,7 @@ from stickslip.study.models.cost import SECONDS_A_NODE, SECONDS_A_WAVE, nodes_of
 
 
 def before_check(file: StudyFile) -> str:
-    """Return the line about the size of the parts, from files and element sizes, and the time that they take on one core."""
+    """Return the line with the size of the parts, estimated from files and element sizes, and their time on one core."""
     case, count = file.cases[0], len(file.cases)
     nodes, waves = nodes_of_tables(case.tables, file.home), _waves(case.tables)
     seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * (waves or 0)), 1.0)
@@ -17,7 +17,7 @@ def before_check(file: StudyFile) -> str:
 
 
 def _waves(tables: Tables) -> int | None:
-    """Return the number of waves of a wheel that are reduced; 0 for a single structure, None if only a file holds the sectors."""
+    """Return the number of reduced waves of a wheel; 0 for a single structure, None if only a file contains the sectors."""
     asked, sectors = getattr(tables, "forced_response", None), sectors_of(tables)
     if sectors is None or sectors == 1:
         return 0 if sectors else None

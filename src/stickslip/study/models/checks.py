@@ -26,14 +26,14 @@ from stickslip.study.questions import ANALYSES
 _FLAT_CURVED = {
     "flat": ("length_m", "flat_between_m"),
     "curved": ("length_m", "curved_width_m"),
-}  # a wedge tells its areas itself
+}  # a wedge needs no keys for its areas
 
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
 SIDES = ("flat", "curved")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-OF_SECTOR = re.compile(r"\[\d+\](?=\.)")  # of one blade of a mistuned wheel
+OF_SECTOR = re.compile(r"\[\d+\](?=\.)")  # index of one blade of a mistuned wheel
 
 
 def refuse(file: StudyFile) -> None:
@@ -42,7 +42,7 @@ def refuse(file: StudyFile) -> None:
     Raises
     ------
     InputError
-        Naming every problem of the file, one a line.
+        If there are such errors; the message names each on a line.
     """
     found: dict[str, InputError] = {}
     for case in file.cases:
@@ -64,7 +64,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
     """
     wrong = [*_parts(tables, home)]
     yield from wrong
-    if not wrong:  # else names mean nothing
+    if not wrong:  # names can be checked only if the parts are valid
         large = too_large(tables, home)
         yield from [large] if large else []
         yield from _surfaces(tables)
@@ -80,7 +80,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
 
 
 def sectors_of(tables: Tables) -> int | None:
-    """Return the number of sectors: 1 for a single structure, None if only a file holds it."""
+    """Return the number of sectors: 1 for a single structure, None if only a file contains it."""
     found: list[int | None] = [1]
     for table in tables.part.values():
         known: Any = table
@@ -211,7 +211,7 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
 
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
-    """Return the names of surfaces and sets of a part before meshing; None if only a file holds them."""
+    """Return the names of surfaces and sets of a part before meshing; None if only a file contains them."""
     table = original(tables, part)
     return None if isinstance(table, FileModel) else _NAMES[type(table)](table)
 
@@ -264,7 +264,7 @@ def _loads(tables: Tables) -> Iterator[InputError]:
 def _driven(tables: Tables) -> Iterator[InputError]:
     """Yield errors about harmonics of loads that the response does not keep."""
     if any(table.harmonic and table.engine_order is None for table in tables.load.values()):
-        own = {name: table.harmonic for name, table in tables.load.items()}  # a wheel's are refused elsewhere
+        own = {name: table.harmonic for name, table in tables.load.items()}  # wheels are checked elsewhere
     else:
         try:
             _, own = engine_order(tables.load, wheel=True)
@@ -304,7 +304,7 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
 
 
 def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
-    """Return the directions in which a point is reported, if known without a mesh; for a single dof its own."""
+    """Return the directions in which a point is reported, if known without a mesh; for a single dof its direction."""
     _, dot, last = point.on.rpartition(".")
     if dot and (last.lower() in COMPONENTS or is_numbered(last.lower())):
         return (last.lower(),)
@@ -314,7 +314,7 @@ def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
 def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
     """Yield errors about analyses with missing inputs."""
     asked: Any = tables
-    # stages are asked for modes alone, and that is said by itself
+    # coupled stages have modes only, which another check reports
     forced = None if staged(tables) else getattr(asked, "forced_response", None)
     driven = [table for table in tables.load.values() if table.harmonic > 0]
     if forced is not None and not driven:
@@ -344,7 +344,7 @@ def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
 
 
 def _without_a_mesh(tables: Tables, home: Path) -> Iterator[InputError]:
-    """Yield errors about speeds in a model that no speed changes."""
+    """Yield errors about speeds in a model that does not depend on the speed."""
     originals = [original(tables, name) for name in tables.part]
     if any(map(_turns, originals)):
         return
@@ -372,7 +372,7 @@ def _turns(table: Any) -> bool:
 
 
 def without_areas(tables: Tables) -> Iterator[InputError]:
-    """Yield an error for each key that a contact per area requires and its body lacks."""
+    """Yield an error for each key that a contact per area needs and its rigid body lacks."""
     contacts: dict[str, Any] = tables.contact
     for name, contact in contacts.items():
         head, _, side = contact.between[0].partition(".")
@@ -391,7 +391,7 @@ def without_areas(tables: Tables) -> Iterator[InputError]:
 
 
 def _told(table: Any, side: str) -> dict[str, Any]:
-    """Return the keys that define the areas of a side's points, with their values; None if missing."""
+    """Return the keys that define the areas of a side's points, with their values; missing values are None."""
     if isinstance(table, FlatCurved):
         return {key: getattr(table, key) for key in _FLAT_CURVED.get(side, ())}
     if isinstance(table, Cylinder):
@@ -403,7 +403,7 @@ def _told(table: Any, side: str) -> dict[str, Any]:
 
 
 def diameter_refusals(tables: Tables, sectors: int | None) -> Iterator[InputError]:
-    """Yield errors about nodal diameters that a wheel with this number of sectors lacks; None: only a file holds the number."""
+    """Yield errors about nodal diameters that a wheel with `sectors` lacks; None: only a file contains the number."""
     for name in ("modes", "campbell", "flutter"):
         yield from _diameters(name, getattr(tables, name, None), sectors)
 

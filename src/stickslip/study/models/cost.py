@@ -16,22 +16,22 @@ from stickslip.study.models.files import MESHES
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
 # modes of five waves: 4.3 GB at 37 683 nodes, 14.9 GB at 99 500
 BYTES_OF_MATRICES, BYTES_OF_FACTORS = 20e3, 2700.0
-BASE_GB = 0.35  # interpreter and libraries
+BASE_GB = 0.35  # memory of interpreter and libraries
 SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
 SECONDS_A_WAVE = 1e-3  # reduction of one wave, for each node: 0.9 to 1.1 ms at 1548 and 1767 nodes
 NODES_A_CUBE = 8.0  # nodes of second-order tetrahedra in a cube of one element size, measured at 600 to 35000 nodes
 OF_A_MESH, OF_MATRICES = 95.0, 4000.0  # bytes of a file for each node
-PACKED = 3.5  # times smaller is a file with the ending .gz
+PACKED = 3.5  # size of a file over its size with gzip
 ADVICE = "Take a coarser mesh, fewer points, contacts or harmonics, or raise the limit."
 
 
 def memory_gb(nodes: float) -> float:
-    """Return the memory in GB for building and reducing parts with these numbers of nodes."""
+    """Return the memory in GB for building and reducing parts with `nodes` nodes."""
     return BASE_GB + nodes * BYTES_A_NODE / 1e9
 
 
 def waves_gb(nodes: float) -> float:
-    """Return the memory in GB for the modes of several waves of a sector: matrices, and the factors that the waves share."""
+    """Return the memory in GB for the modes of several waves of a sector: matrices, and factors shared by the waves."""
     factors = BYTES_OF_FACTORS * float(nodes ** (4 / 3))
     return BASE_GB + (nodes * BYTES_OF_MATRICES + factors) / 1e9
 
@@ -50,14 +50,14 @@ def nodes_of_tables(tables: Tables, home: Path) -> float:
 
 
 def _asks_for_waves(tables: Tables) -> bool:
-    """Return whether modes of the waves of a sector are needed."""
+    """Whether the study needs modes of the waves of a sector."""
     asked = any(getattr(tables, name, None) is not None for name in ("modes", "safe"))
     sectors: list[Any] = [getattr(table, "sectors", None) for table in tables.part.values()]
     return asked and any(count is not None and count > 1 for count in sectors)
 
 
 def above(limits: Limits, what: str, memory: float, seconds: float) -> InputError | None:
-    """Return the error about the limit that an estimate exceeds; None if it exceeds none. `what` begins the sentence."""
+    """Return the error about a limit that an estimate exceeds, None if it exceeds none; `what` begins the sentence."""
     found = {"memory_gb": (memory, ".1f", "GB"), "work_s": (seconds, ".0f", "s")}
     for key, (needed, digits, unit) in found.items():
         allowed = getattr(limits, key)
@@ -68,7 +68,7 @@ def above(limits: Limits, what: str, memory: float, seconds: float) -> InputErro
 
 
 def _nodes(table: Any, home: Path) -> float:
-    """Estimate the number of nodes of a part; a copy shares those of its original."""
+    """Estimate the number of nodes of a part; a copy has none, since it shares its original's."""
     if isinstance(table, PrismBlades):
         return blade_nodes(build(BladePair, table))
     if isinstance(table, Sector):
@@ -114,5 +114,5 @@ def file_nodes(path: Path) -> float:
 
 
 def _block(size: float, *lengths: float) -> float:
-    """Estimate the number of nodes of a block with a given element size, at least one element across, nodes on its faces included."""
+    """Estimate the number of nodes of a block, with its faces, from the element size; at least one element across."""
     return NODES_A_CUBE * prod(max(length / size, 1.0) + 1.0 for length in lengths)

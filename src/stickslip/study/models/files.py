@@ -31,13 +31,13 @@ from stickslip.model.structure import Structure
 from stickslip.study.file.model.parts import FileModel, SetTable
 from stickslip.study.own_code import called
 
-EDGE = 1e-9  # of the size of the mesh, by which boxes and cylinders are larger: nodes lie on their faces
+EDGE = 1e-9  # enlargement of boxes and cylinders, over the size of the mesh, to include nodes on their faces
 
 
 def with_sets(
     key: str, tables: Mapping[str, SetTable], points: FloatArray, known: Mapping[str, IntArray]
 ) -> dict[str, IntArray]:
-    """Return the sets of a file together with those that the study defines.
+    """Return the sets of a file together with the sets that the study defines.
 
     Parameters
     ----------
@@ -114,8 +114,8 @@ def _nothing(place: str, table: SetTable, points: FloatArray) -> InputError:
 ROOT = "root"
 DECKS, ARCHIVES = (".inp", ".inp.gz"), (".cdb",)
 MESHES = (*DECKS, *ARCHIVES)
-PITCH = 1e-4  # of the size of a sector, by which partners may lie beside each other
-COMPANIONS = (".mas", ".dof")  # what CalculiX writes beside a stiffness
+PITCH = 1e-4  # largest distance of partners over the size of a sector
+COMPANIONS = (".mas", ".dof")  # suffixes of the files that CalculiX writes with a stiffness
 _KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
 
 
@@ -165,13 +165,13 @@ def with_companions(path: Path) -> list[Path]:
 
 
 def _words(key: str) -> dict[str, str]:
-    """Return the study's keys for the arguments of the readers."""
+    """Return the study's keys by the arguments of the readers."""
     words = {name: f"{key}.{name}" for name in ("units", "mesh", "mass", "nodes")}
     return words | {"plausible": f"{key}.plausible = false", "ignore": "", "use": _KEPT}
 
 
 def _sectors(key: str, table: FileModel, of_deck: int | None = None) -> int:
-    """Return the number of sectors from the deck, which the study may repeat, or from the study."""
+    """Return the number of sectors from the deck, or else from the study; if both give it, they must agree."""
     if of_deck is not None and table.sectors not in (None, of_deck):
         raise input_error(
             f"{key}.sectors",
@@ -247,7 +247,7 @@ def _from_archive(key: str, table: FileModel, path: Path, given: Material | None
 
 
 def _cyclic_pairs(key: str, mesh: SolidMesh, sectors: int, axis: Axis) -> SolidMesh:
-    """Return a mesh with cyclic faces from its coupled pairs, and the nodes on the axis.
+    """Return a mesh with cyclic faces made of its coupled pairs of nodes, and the nodes on the axis.
 
     Raises
     ------
@@ -326,7 +326,7 @@ def _from_matrices(
     mesh = None
     if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
         mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
-    if table.damping is None and dissipates(structure):  # its own is meant, not that of the whole study
+    if table.damping is None and dissipates(structure):  # the file's damping counts, not the damping of the whole study
         others = {name: value for name, value in others.items() if name != "damping"}
     faces = _faces(key, table, structure.sets, sectors)
     others["warnings"] = negative_damping(structure, table.file)
@@ -385,7 +385,7 @@ def _no_face(place: str, sectors: int, sets: Iterable[str]) -> InputError:
 
 
 def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
-    """Return the name of a set as in the file, capitals aside."""
+    """Return the name of a set as in the file; capitals do not matter."""
     found = alike(name, sets)
     if found is not None:
         return found

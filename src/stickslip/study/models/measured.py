@@ -19,10 +19,10 @@ from stickslip.study.models.model import newton
 
 PLACE = "measured.file"
 AMPLITUDE, FREQUENCY, EXCITATION = "peak_amplitude", "peak_frequency", "excitation_n"
-LIKE = "note", "comment"  # columns of words
+LIKE = "note", "comment"  # columns of text
 PER_FORCE = {f"{unit}_per_n": factor for unit, factor in LENGTHS.items()}
 HZ = {"hz": 1.0}
-ERRORS = {"std": "standard deviation", "half_width": "half-width"}  # of error bars
+ERRORS = {"std": "standard deviation", "half_width": "half-width"}  # kinds of error bars
 TURNS = (".rx", ".ry", ".rz")
 
 
@@ -33,7 +33,7 @@ class Quantity:
     Parameters
     ----------
     values, errors
-        (n,) in `unit`; NaN if not measured or without an error bar.
+        (n,) values and error bars in `unit`; NaN if not measured or without an error bar.
     unit
         SI unit, or Hz.
     bar
@@ -61,7 +61,7 @@ class MeasuredPeaks:
     values
         (n,) values of this key.
     others
-        (n,) other varied keys with their values, written as in labels of cases; empty if the file lacks them.
+        (n,) other varied keys with their values as text, as in labels of cases; empty if the file lacks them.
     amplitude
         Amplitude of the output whose peak is reported, m or m/N.
     frequency
@@ -81,7 +81,7 @@ class MeasuredPeaks:
 
     @property
     def sentence(self) -> str:
-        """The line of ``stickslip check``."""
+        """Line about the peaks in ``stickslip check``."""
         n = self.values.size
         of = f", {self.source}" if self.source else ""
         return f"measured: {n} point{'s' * (n != 1)} of {self.file} over {self.key}{of}"
@@ -124,7 +124,7 @@ def measured_peaks(file: StudyFile) -> MeasuredPeaks | None:
 
 
 def _varied_number(file: StudyFile) -> str:
-    """Return the varied key of the optimisation curves: the first one with different numbers."""
+    """Return the varied key of the optimisation curves: the first key whose values are different numbers."""
     place, tables = f"{file.path}: measured", file.tables
     if any(key.startswith("measured.") for key in file.cases[0].values):
         raise input_error(place, "is varied", "Leave it out of [vary]: it is of all cases.")
@@ -202,7 +202,7 @@ def _quantity(columns: MeasuredColumns, name: str, units: Mapping[str, Mapping[s
 
 
 def _column(columns: MeasuredColumns, stem: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, FloatArray]:
-    """Return unit and numbers of a column; no unit if the column is missing."""
+    """Return unit and numbers of a column; an empty unit if the column is missing."""
     found = [(unit, *columns.named(stem, names)) for unit, names in units.items()]
     there = [(unit, name, factor) for unit, name, factor in found if name]
     if len(there) > 1:
@@ -260,7 +260,7 @@ def _refuse(columns: MeasuredColumns, found: MeasuredPeaks) -> None:
 def _with_forces(
     columns: MeasuredColumns, found: MeasuredPeaks, file: StudyFile, others: Sequence[str]
 ) -> MeasuredPeaks:
-    """Return the peaks with the force of the study if the file has none.
+    """Return the peaks, with forces from the study if the file has none.
 
     Raises
     ------

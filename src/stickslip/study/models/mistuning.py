@@ -37,7 +37,7 @@ def mistuning_of(
     parts
         All parts of the study, including spare parts.
     own_name
-        Function that turns a name of the study into a name of the model.
+        Function from a name in the study to the name in the model.
 
     Raises
     ------

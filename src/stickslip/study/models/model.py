@@ -1,4 +1,4 @@
-"""Study tables turned into a model."""
+"""Conversion of study tables to a model."""
 
 import re
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from stickslip.study.models.spares import spare_parts
 from stickslip.units import DEG, HZ, RPM
 
 DOF = re.compile(r"node\d+(\.r?[xyz])?|r?[xyz]|dof\d+")
-NORMAL_ALONE = ("unilateral_spring",)  # laws without tangential forces
+NORMAL_ALONE = ("unilateral_spring",)  # laws with normal forces only
 
 
 def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
@@ -42,7 +42,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     Raises
     ------
     InputError
-        Naming the key, if files cannot be read or inputs are inconsistent.
+        If files cannot be read or inputs are inconsistent; the message names the key.
     """
     every = Workshop(tables, home, memo).parts()
     spare = spare_parts(tables)
@@ -86,7 +86,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
 
 
 def _require_speed(tables: Tables, parts: Mapping[str, Part]) -> None:
-    """Refuse a study without a speed if one of its files rotates."""
+    """Refuse a study without a speed if one of its files has one."""
     if "speed_rpm" in tables.rotation.model_fields_set:
         return
     for name, part in parts.items():
@@ -112,7 +112,7 @@ def newton(tables: Tables, table: LoadTable) -> float:
     """Return the force of a load, N: its own value, or the force of another load divided by the ratio."""
     if table.force_n is not None:
         return table.force_n
-    if table.pressure is not None:  # the share of the field
+    if table.pressure is not None:  # factor of the pressure field
         return 1.0
     other = tables.load[str(table.ratio_of).removeprefix("load.")]
     assert table.ratio is not None
@@ -145,7 +145,7 @@ def _between(parts: Mapping[str, Part], names: list[str]) -> tuple[str, str]:
 
 
 def _own_name(parts: Mapping[str, Part], name: str) -> str:
-    """Return the name of a surface as in its file, capitals aside."""
+    """Return the name of a surface as in its file; capitals do not matter."""
     ahead = NEXT if name.startswith(NEXT) else ""
     head, dot, rest = name.removeprefix(NEXT).partition(".")
     if name == GROUND or head not in parts or not rest:

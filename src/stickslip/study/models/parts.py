@@ -1,4 +1,4 @@
-"""The tables [part.NAME] as parts; equal tables share one part."""
+"""Conversion of the tables [part.NAME] to parts; equal tables share one part."""
 
 import json
 import logging
@@ -38,34 +38,34 @@ from stickslip.study.own_code import is_address, made, of_address, state_of
 from stickslip.units import DEG
 
 LOG = logging.getLogger("stickslip")
-REMEMBERED = 16  # parts that are kept in memory
-CHUNK = 1 << 20  # bytes of a file that are hashed at a time
+REMEMBERED = 16  # number of parts kept in memory
+CHUNK = 1 << 20  # bytes of a file hashed at a time
 
 Memo = MutableMapping[str, Part]
 
 
 @dataclass(frozen=True)
 class OwnReduction:
-    """A reduction of the user.
+    """A user's reduction.
 
     Parameters
     ----------
     made
         The reduction: a dataclass with `of` and `in_words`.
     code
-        State of its code, on which reduced parts that are kept on disk depend.
+        State of its code, which is part of the key of reduced parts on disk.
     """
 
     made: Reducing
     code: str
 
     def of(self, structure: Structure, keep: IntArray) -> Structure:
-        """Return a structure reduced to the dofs `keep` and whatever the user adds."""
+        """Return a structure reduced to the dofs `keep` and the user's further coordinates."""
         return self.made.of(structure, keep)
 
     @property
     def in_words(self) -> str:
-        """Method in words."""
+        """Name of the method."""
         return self.made.in_words
 
 
@@ -92,7 +92,7 @@ class Workshop:
         return {name: self.part(name) for name in self.tables.part}
 
     def part(self, name: str) -> Part:
-        """Return a part; an unchanged part of an earlier case is used again."""
+        """Return a part; a part that an earlier case has built from equal input is used again."""
         key = digest(self.tables, name, self.home)
         if key not in self.memo:
             made = self._made(name, self.tables.part[name])
@@ -121,7 +121,7 @@ class Workshop:
         return found
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
-        """Return damping and reduction of a part; `reduced` is the default where the study does not specify a reduction."""
+        """Return damping and reduction of a part; `reduced`: whether it is reduced if the study specifies no reduction."""
         reduction = table.reduction or self.tables.reduction or ReductionTable()
         found: dict[str, Any] = {}
         if reduced or table.reduction is not None:
@@ -162,7 +162,7 @@ class Workshop:
         else:
             structure = lumped(np.array(table.masses_kg), stiffness, damping, table.labels)
         others = self.others(table, reduced=False)
-        if table.dashpots_n_s_per_m and table.damping is None:  # has its own
+        if table.dashpots_n_s_per_m and table.damping is None:  # the dashpots are its damping
             others.pop("damping", None)
         return structure_part(structure, sectors=table.sectors, **others)
 
@@ -208,7 +208,7 @@ def _own_reduction(address: str) -> OwnReduction:
 
 
 def place_in_steps(steps: Sequence[Placed]) -> Place:
-    """Return the placement of a part that is mirrored, turned and moved in steps."""
+    """Return the placement of a part from steps of mirroring, turning and moving."""
     place = Place(np.eye(3), np.zeros(3))
     for step in steps:
         x, y, z = step.move_m
@@ -220,7 +220,7 @@ def place_in_steps(steps: Sequence[Placed]) -> Place:
 
 
 def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
-    """Return the geometry of a flat_curved part; missing values come from the platforms that have its nodes.
+    """Return the geometry of a flat_curved part; missing values come from platforms with nodes at its points.
 
     Raises
     ------

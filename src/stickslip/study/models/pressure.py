@@ -23,7 +23,7 @@ COLUMNS = (
     "x_m, y_m, z_m, then pressure_pa, or real_pa and imag_pa, or amplitude_pa and phase_deg; area_m2 with normal_x, normal_y, normal_z. "
     "_mm, _mm2, _kpa, _mpa and _bar are other units"
 )
-UNIT = 1e-3  # by which the length of a normal may be off
+UNIT = 1e-3  # largest deviation of a normal's length from 1
 
 
 def pressure_refusals(tables: Tables, home: Path) -> Iterator[InputError]:
@@ -52,7 +52,7 @@ def read_pressure(path: Path, length_unit: str, *, static: bool) -> PressureFiel
     Raises
     ------
     InputError
-        Naming file, line, column and value.
+        If the file cannot be used; the message names file, line, column and value.
     """
     if path.suffix.lower() in VTK:
         return _of_vtk(path, LENGTHS[length_unit], static=static)
@@ -129,7 +129,7 @@ def _of_vtk(path: Path, length: float, *, static: bool) -> PressureField:
         raise missing_package("meshio", error, "fe") from error
     try:
         mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # noqa: BLE001  it says it of wrong files in a dozen ways
+    except (Exception, SystemExit) as error:  # noqa: BLE001  the library raises many different errors on wrong files
         said = " ".join(str(error).split())
         raise input_error(str(path), f"cannot be read as VTK ({said})", "Write it as .vtu, ASCII.") from None
     points = length * np.asarray(mesh.points, dtype=float)

@@ -1,4 +1,4 @@
-"""Errors in [mistuning.NAME] that can be found without a mesh, and parts that occur in single sectors only."""
+"""Errors in [mistuning.NAME] that can be found without a mesh, and parts that occur only in single sectors."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -85,7 +85,7 @@ def _own_refusals(tables: Tables, key: str, table: MistuningTable) -> Iterator[I
 
 
 def _elsewhere(old: Lumped, new: Lumped) -> bool:
-    """Return whether a name common to both belongs to different masses; masses are matched by their order."""
+    """Whether a name in both tables belongs to different masses; masses are matched by their order."""
     at = {name: i for i, name in enumerate(new.labels)}
     return any(at.get(name, i) != i for i, name in enumerate(old.labels))
 

@@ -38,7 +38,7 @@ class Study:
 
     @property
     def path(self) -> Path:
-        """Path of the file, as messages name it."""
+        """Path of the file for messages."""
         return self.file.path
 
     @property
@@ -53,7 +53,7 @@ class Study:
 
     @property
     def code(self) -> OwnCode:
-        """Code of the user that the file names."""
+        """User's code that the file names."""
         return self.file.code
 
     @property
@@ -77,7 +77,7 @@ class Study:
         return measured_peaks(self.file)
 
     def cases(self) -> tuple[Case, ...]:
-        """Return the cases of [vary], one without it. Models are built on request."""
+        """Return the cases of [vary], or a single case without it. Models are built on request."""
         return tuple(self._case(i, case) for i, case in enumerate(self.file.cases))
 
     def model(self, case: int = 0) -> Model:
@@ -95,7 +95,7 @@ class Study:
             raise error.inside(str(self.path)) from None
 
     def replace(self, values: Mapping[str, Any]) -> "Study":
-        """Return the study with other values of some keys: ``{"contact.flat.friction_coefficient": 0.4}``.
+        """Return the study with other values of some keys, such as ``{"contact.flat.friction_coefficient": 0.4}``.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class OtherModel:
             raise self._refused(key, value, error) from None
 
     def study(self, key: str, value: float) -> Study:
-        """Return the study of the changed model, which has passed all checks that need no mesh.
+        """Return the study of the changed model, after all checks that need no mesh.
 
         Raises
         ------
@@ -186,18 +186,18 @@ class OtherModel:
 
 
 def read_study(path: Path, *, allow_code: bool = False) -> Study:
-    """Read a study file and make all checks that need no mesh; `allow_code` as for `read_file`.
+    """Read a study file and make all checks that need no mesh; `allow_code` as in `read_file`.
 
     Raises
     ------
     InputError
-        Naming every problem of the file, one a line.
+        If the file has errors; the message names each on a line.
     """
     return _checked(Study(read_file(path, allow_code=allow_code)))
 
 
 def _drive(tables: Tables) -> float:
-    """Return the ratio of harmonic to static forces; without static forces relative to 1 N."""
+    """Return the ratio of harmonic to static forces; without static forces, the harmonic forces over 1 N."""
     static, harmonic = 0.0, 0.0
     for load in tables.load.values():
         if load.harmonic == 0:

@@ -1,1 +1,1 @@
-"""Files of a run; none is ever partly written."""
+"""Files of a run; all writes are atomic."""

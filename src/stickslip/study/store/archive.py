@@ -1,4 +1,4 @@
-"""Named arrays, numbers and texts as NumPy archives with a checksum, without pickle; and the cache of parts of a model that consists of them."""
+"""Named arrays, numbers and texts as NumPy archives with a checksum and without pickle, and a cache of such archives on disk."""
 
 import io
 import zipfile
@@ -16,11 +16,11 @@ from stickslip.model.checksum import checked, with_checksum
 from stickslip.study.store.atomic_write import write_whole
 from stickslip.study.store.progress import LOG
 
-# bytes before the description of an array: what NumPy marks its files with, then the length of the description
+# bytes before the description of an array: NumPy's magic string, then the length of the description
 HEADER = np.lib.format.MAGIC_LEN + 2
-LAST_NAME = ".npy"  # of an array in the archive
+LAST_NAME = ".npy"  # suffix of an array in the archive
 
-FORMAT = 8  # of all that is kept: raised whenever tables, records or archives change, once an issue at most
+FORMAT = 8  # version of all stored files, raised when tables, records or archives change, at most once for each release
 
 
 def encode(values: Mapping[str, Any]) -> bytes:
@@ -45,14 +45,14 @@ def decode(payload: bytes) -> dict[str, Any]:
             found = {n.removesuffix(LAST_NAME): _array(opened.read(n)) for n in opened.namelist()}
     except MemoryError:
         raise
-    # of another program that knows the checksum: zipfile, zlib and NumPy say it of wrong bytes in a dozen ways
+    # an archive with a valid checksum from another program: zipfile, zlib and NumPy raise many different errors
     except Exception as error:
         raise ValueError(f"damaged archive: {error}") from error
     return {k: v.item() if v.ndim == 0 else v for k, v in found.items()}
 
 
 def _array(content: bytes) -> Any:
-    """Return an array as `numpy.savez` wrote it. `numpy.load` parses each header anew, which takes two thirds of its time."""
+    """Return an array written by `numpy.savez`. `numpy.load` parses each header anew, in two thirds of its time."""
     end = HEADER + int.from_bytes(content[HEADER - 2 : HEADER], "little")
     shape, by_columns, dtype = _described(content[:end])
     if dtype.hasobject:
@@ -80,7 +80,7 @@ def encode_record(record: Any) -> bytes:
 
 
 def flat(record: Any) -> dict[str, Any]:
-    """Return the fields of a record by name; those of nested records as ``field/index/name``, with their number."""
+    """Return the fields of a record by name; fields of nested records as ``field/index/name``, with the number of records."""
     found: dict[str, Any] = {}
     for own in (f for f in fields(record) if f.init):
         value = getattr(record, own.name)
@@ -106,7 +106,7 @@ def decode_record(payload: bytes, kind: type[Any]) -> Any:
 
 
 def from_flat(values: Mapping[str, Any], kind: type[Any]) -> Any:
-    """Return a record of class `kind` from what `flat` returns, as a note keeps it."""
+    """Return a record of class `kind` from the result of `flat`, as stored in a note."""
     hints = _hints(kind)  # type: ignore[arg-type]  # a class has a hash
     own: dict[str, Any] = {}
     inner: dict[str, dict[int, dict[str, Any]]] = {}
@@ -147,7 +147,7 @@ class PartStore:
     written: set[Path] = field(default_factory=set)
 
     def kept(self, content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        """Return the result of `make`, stored or new; `content` is everything that it depends on."""
+        """Return the stored result of `make`, or make and store it; `content` is everything that it depends on."""
         if self.folder is None:
             return make()
         named = sha256(f"{FORMAT} {content}".encode()).hexdigest()
@@ -157,7 +157,7 @@ class PartStore:
                 return decode(path.read_bytes())
             except (ValueError, OSError) as error:
                 LOG.info(f"{path} is damaged and made anew ({error})")
-        # what is computed and what is read are the same to the last bit, and of the same kinds
+        # encode and decode new results, too: computed and read values then have equal bits and types
         payload = encode(make())
         write_whole(path, payload)
         self.written.add(path)

@@ -1,7 +1,7 @@
-"""Journals that several processes may write at once: each has its own, and the furthest counts.
+"""Several attempts at one job: each process has its own journal, and the one with most progress counts.
 
-No lock is needed, so this is good on shared folders whose locks are not to be relied on. What two processes find of the same job
-is the same to the last bit, so either may seal it.
+No lock is needed, so this works on shared folders with unreliable locks. Two processes get exactly the same results for a job, so
+either may seal it.
 """
 
 import shutil
@@ -32,7 +32,7 @@ def left_behind(sealed: Path) -> list[Path]:
 
 
 def reached(path: Path) -> tuple[int, int, int]:
-    """Return the progress of a file: its size, then its number of records, since small records may not change the size."""
+    """Return the progress of a file: its size, its number of records (small records may not change the size), and deaths."""
     return (_size(path), *read_place(path))
 
 
@@ -61,15 +61,15 @@ def clear(sealed: Path) -> None:
     """Remove all files left by the attempts at a sealed job; files already removed by another process are ignored."""
     for end in (AT_WORK, f"{AT_WORK}{BESIDE}"):
         for file in sealed.parent.glob(f"{sealed.stem}.*{end.removeprefix('.')}"):
-            with suppress(OSError):  # the next run in the folder does
+            with suppress(OSError):  # the next run in the folder removes it
                 file.unlink(missing_ok=True)
 
 
 def _copied(path: Path, own: Path, record: type) -> bool:
-    """Copy a file that may be written to meanwhile; return whether the copy is good."""
+    """Copy a file to which another process may be writing; return whether the copy is valid."""
     copy = file_at_work(own.with_name(own.name.partition(".")[0]), new_owner())
     try:
-        # SQLite undoes in the copy what was cut off in the original
+        # with the rollback journal, SQLite undoes incomplete writes in the copy
         with suppress(FileNotFoundError):
             shutil.copyfile(f"{path}{BESIDE}", f"{copy}{BESIDE}")
         shutil.copyfile(path, copy)

@@ -1,4 +1,4 @@
-"""The results folder: created, tested and locked before a run."""
+"""The results folder, which is created, tested and locked before a run."""
 
 import os
 import shutil
@@ -19,17 +19,17 @@ RESULT, REPORT, LOG_FILE, LOCK = "result.nc", "report.html", "run.log", "run.loc
 JOBS, PARTS = "jobs", "parts"
 TRIAL = ".stickslip-trial"
 LONGEST_PATH = 512  # bytes of the path of an SQLite file
-LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # of such a file in a folder
-WHOLE = (RESULT, REPORT, CODE_FILE, f"{PARTS}/*.npz")  # files that have another name until they are whole
+LONGEST_NAME = len(f"/{JOBS}/{64 * 'k'}.{12 * 'o'}{AT_WORK}{BESIDE}")  # bytes of its longest name in a results folder
+WHOLE = (RESULT, REPORT, CODE_FILE, f"{PARTS}/*.npz")  # files written under a temporary name until complete
 OWN = (*WHOLE, *map(beside, WHOLE), *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", BESIDE)))
-LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
+LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # files that a killed run may leave behind
 SHARD_LOGS = "run-*-of-*.log"
-HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
+HELD = (LOCK, f"{LOCK}{BESIDE}", LOG_FILE, SHARD_LOGS, *LEFT)  # further files that every run may write
 
 
 @contextmanager
 def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Create the results folder, lock it for one run or for all its shards, and check that a run's files fit into it.
+    """Create the results folder, lock it for one run or for all its shards, and check that a run can write its files.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
 
 @contextmanager
 def token_file(folder: Path) -> Iterator[Path]:
-    """Yield a file that exists while the block runs; it shows other machines that they see the folder and that the run continues."""
+    """Yield a file that exists while the block runs: it shows other machines that they see the folder and the run continues."""
     token = folder / f"run-{uuid4().hex[:12]}.on"
     try:
         token.touch(exist_ok=False)
@@ -89,7 +89,7 @@ def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] 
     """
     patterns = (*OWN, *own, *map(beside, own))
     found = [path for pattern in patterns for path in _found(folder, pattern)]
-    for path in folder.glob(f"{JOBS}/*{AT_WORK}"):  # a worker may outlive the run that was killed
+    for path in folder.glob(f"{JOBS}/*{AT_WORK}"):  # a worker may outlive a killed run
         with suppress(sqlite3.DatabaseError):
             _locked(path, folder).close()
     for path in found:
@@ -108,7 +108,7 @@ def _refuse_strangers(folder: Path) -> None:
         try:
             mode = path.lstat().st_mode
         except FileNotFoundError:
-            continue  # another shard has renamed or removed its file since it was listed
+            continue  # another shard has renamed or removed its file in the meantime
         if S_ISLNK(mode):
             raise _stranger(path, "is a link, which a run does not follow")
         if path not in inner and not S_ISREG(mode):
@@ -146,9 +146,9 @@ def _try_out(folder: Path) -> None:
 
 
 def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connection:
-    """Return a lock on a file, held until it is closed or the process ends. SQLite locks files alike on all systems.
+    """Return a lock on a file, held until it is closed or the process ends; SQLite locks files in the same way on all systems.
 
-    Shards share it, so that no other run begins meanwhile; where the folder's machine knows no locks, they do without.
+    Shards share the lock, so that no other run begins. On file systems without locks, shards run unlocked.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connec
 
 
 def _found(folder: Path, pattern: str) -> Iterator[Path]:
-    """Yield the entries of a folder that match a pattern, broken links included."""
+    """Yield the entries of a folder that match a pattern, including broken links."""
     if "*" in pattern:
         yield from folder.glob(pattern)
     elif os.path.lexists(folder / pattern):
@@ -181,7 +181,7 @@ def _found(folder: Path, pattern: str) -> Iterator[Path]:
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:
-    # of os.path, which says no where a name is too long to be looked up
+    # os.path returns False for names that are too long, where Path raises
     ways = (folder / JOBS, folder / PARTS, folder, *folder.parents)
     for path in ways:
         if os.path.exists(path) and not os.path.isdir(path):  # noqa: PTH110, PTH112

@@ -1,8 +1,8 @@
-"""The journal of a job, record by record.
+"""The journal of a job, one SQLite file, to which records are appended.
 
-One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
-leaves whole records only. Every record and note ends with its checksum, and a sealed file holds one of all of them. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of
-several machines share the folder; sealed, it is ``<key>.job``.
+Every record is a transaction with full synchronisation and a rollback journal, so a killed run leaves only complete records. Every
+record and note ends with its checksum, and a sealed file has a checksum of all of them. The file of a running job is ``<key>.part``,
+or ``<key>.<owner>.part`` if processes of several machines share the folder; the sealed file is ``<key>.job``.
 """
 
 import sqlite3
@@ -18,10 +18,10 @@ from stickslip.study.store.archive import FORMAT, decode, decode_record, encode,
 from stickslip.study.store.atomic_write import unwritable, unwritable_database
 
 AT_WORK, SEALED = ".part", ".job"
-BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
-WHOLE = "whole"  # of a file that has been sealed: the checksum of all its records and notes
-DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
-MANY_EMPTY = 256  # pages of notes that were given up, 4 kB each, from which a file is packed
+BESIDE = "-journal"  # suffix of SQLite's rollback journal
+WHOLE = "whole"  # key of the checksum of all records and notes in a sealed file
+DEATHS, DIED_AT = "deaths", "died at"  # keys: abnormal ends of the job's process, and the records and notes at the last
+MANY_EMPTY = 256  # empty pages of deleted notes, 4 kB each, above which a file is compacted
 PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
 ANEW = "Run anew with --fresh, which removes what runs wrote into the folder and no other file."
 FRESH = "Delete it, or start over with --fresh, which removes what runs wrote into the folder and no other file."
@@ -56,7 +56,7 @@ class JobJournal:
         with _named(path):
             self._db = _opened(path)
             try:
-                # held until the process ends, however it ends
+                # the lock is held until the process ends, normally or not
                 self._db.execute("pragma locking_mode = exclusive")
                 self._db.execute("pragma journal_mode = delete")
                 self._db.execute("pragma synchronous = full")
@@ -78,7 +78,7 @@ class JobJournal:
         self._db.close()
 
     def add(self, record: object) -> None:
-        """Store a finished record; it is on the disk when this returns."""
+        """Store a finished record; it is on disk when this returns."""
         payload = encode_record(record)
         with _named(self._path):
             self._db.execute("insert into record (payload) values (?)", (payload,))
@@ -119,7 +119,7 @@ class JobJournal:
             _notes(self._db)
 
     def died(self) -> int:
-        """Count one more abnormal end of the job's process; return the number of such ends since the last record or note."""
+        """Count an abnormal end of the job's process; return the number of such ends since the last record or note."""
         with _named(self._path):
             (count,) = self._db.execute(PLACE).fetchone()
             kept = dict(self._db.execute("select key, value from meta"))
@@ -129,7 +129,7 @@ class JobJournal:
         return deaths
 
     def seal(self) -> None:
-        """Close the file and rename it to that of a finished job."""
+        """Add the checksum, close the file and rename it to the name of a finished job."""
         with _named(self._path):
             self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
             self._db.execute("insert into meta values (?, ?)", (WHOLE, _checksum(self._db)))
@@ -156,13 +156,13 @@ def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str
 
 
 def read_note(path: Path, name: str) -> dict[str, Any] | None:
-    """Return one note of a sealed job; None if it has none of this name. Errors as in `read_sealed`."""
+    """Return one note of a sealed job; None for an unknown name. Errors as in `read_sealed`."""
     with _named(path), _reading(path) as db:
         return _note(db, name)
 
 
 def read_place(path: Path) -> tuple[int, int]:
-    """Return the number of records in a job's file, and of abnormal ends since the last; zeros for an unreadable file."""
+    """Return the number of records in a job's file, and of abnormal ends since the last record; zeros for an unreadable file."""
     try:
         with closing(_unlocked(path)) as db:
             (records,) = db.execute("select count(*) from record").fetchone()
@@ -186,11 +186,11 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    """Open a file, without locks if nobody else writes to it, since some shared folders have none."""
+    """Open a file; without locks if it has an owner and so a single writer, since some shared folders have no locks."""
     name, alone = str(path), path.stem != _key(path)
     if alone:
         name = f"{path.absolute().as_uri()}?nolock=1"
-    # autocommit: each insert is a transaction of its own
+    # autocommit: each insert is its own transaction
     return sqlite3.connect(name, isolation_level=None, timeout=0.5, uri=alone)
 
 
@@ -215,7 +215,7 @@ def _check_mark(db: sqlite3.Connection, path: Path) -> None:
 
 
 def _checksum(db: sqlite3.Connection) -> str:
-    """Return the checksum of all records and notes, each under its number or name."""
+    """Return the checksum of all records and notes, with their numbers or names."""
     found = sha256()
     for rows in ("select id, payload from record order by id", "select name, payload from note order by name"):
         for place, payload in db.execute(rows).fetchall():  # see `_notes`
@@ -224,7 +224,7 @@ def _checksum(db: sqlite3.Connection) -> str:
 
 
 def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
-    """Return the records after a check that none is missing: they are numbered without gaps, and the last number is stored separately."""
+    """Return the records after a check that none is missing: numbers have no gaps, and the last number is stored separately."""
     rows = db.execute("select id, payload from record order by id").fetchall()
     last = db.execute("select seq from sqlite_sequence where name = 'record'").fetchone()
     if [number for number, _ in rows] != list(range(1, (last[0] if last else 0) + 1)):
@@ -233,7 +233,7 @@ def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
 
 
 def _notes(db: sqlite3.Connection) -> dict[str, dict[str, Any]]:
-    # all at once: a query that an error cuts off would hold the file's lock for as long as the error lives
+    # fetchall: a query interrupted by an error would hold the file's lock as long as the exception exists
     rows = db.execute("select name, payload from note order by name").fetchall()
     return {name: decode(payload) for name, payload in rows}
 
@@ -245,7 +245,7 @@ def _note(db: sqlite3.Connection, name: str) -> dict[str, Any] | None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Turn errors of libraries about a damaged file or a full disk into an error that names the file."""
+    """Convert errors of libraries about a damaged file or a full disk into an error that names the file."""
     try:
         yield
     except InputError:

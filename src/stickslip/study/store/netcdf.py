@@ -1,4 +1,4 @@
-"""Labelled variables, and atomic writing and reading of their files."""
+"""Labelled variables, and atomic writing and reading of result files."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
@@ -17,21 +17,21 @@ _AGAIN = (
     "Give the result.nc that 'stickslip run' wrote, or its folder. Of a damaged one, run the study again: no finished point is "
     "computed anew. With --fresh everything is, after what runs wrote into the folder is removed, and no other file."
 )
-_TOLD = {"xyz", "order"}  # dimensions of what one case tells of itself
+_TOLD = {"xyz", "order"}  # dimensions of variables that become attributes in the dataset of one case
 _MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": ""}
 
 
 def write_tree(tree: xr.DataTree, path: Path) -> None:
-    """Write netCDF-4 with a checksum at its end, under a temporary name, and move it to `path`.
+    """Write netCDF-4 with a checksum at the end, under a temporary name, and move it to `path`.
 
-    Readers of HDF5 ignore bytes behind the end of file that its header names.
+    Readers of HDF5 ignore bytes after the end of file that is stated in its header.
 
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
+    # made in memory: on a full disk HDF5 leaves open files, which print tracebacks when closed
     with interrupted_later():
         write_whole(path, with_checksum(to_bytes(tree)))
 
@@ -42,10 +42,10 @@ def read_tree(path: Path) -> xr.DataTree:
     Raises
     ------
     InputError
-        If it cannot be read, or does not agree with its checksum.
+        If the file cannot be read, or does not agree with its checksum.
     """
     try:
-        check_file(path)  # HDF5 may read damaged files for ever, or end the process
+        check_file(path)  # HDF5 may hang or crash on damaged files
     except ValueError as error:
         raise input_error(str(path), str(error), _AGAIN) from None
     try:
@@ -56,7 +56,7 @@ def read_tree(path: Path) -> xr.DataTree:
             return tree.load()
     except MemoryError:
         raise
-    except Exception as error:  # noqa: BLE001  the libraries say it of wrong bytes in a dozen ways
+    except Exception as error:  # noqa: BLE001  the libraries raise many different errors on damaged files
         said = " ".join(str(error).split())
         raise input_error(str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN) from None
 
@@ -66,7 +66,7 @@ def attributes_there(path: Path) -> dict[str, Any]:
     try:
         check_file(path)
     except Cut:
-        pass  # what stands before is whole, or HDF5 sees its end missing
+        pass  # the content before the checksum is complete, or HDF5 notices that its end is missing
     except (OSError, ValueError):
         return {}
     try:
@@ -106,7 +106,7 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
 
 
 def alike(data: xr.Dataset) -> list[list[int]]:
-    """Return the cases of a dataset in groups of equal content, labels apart; a varied key need not affect every analysis."""
+    """Return the cases of a dataset in groups of equal content, except labels: a varied key need not affect every analysis."""
     labels = [name for name in data.coords if data[name].dims == ("case",)]
     told = ["case_label", "vary_value", "seconds", *labels]
     own = [data.isel(case=i).drop_vars(told, errors="ignore") for i in range(data.sizes["case"])]

@@ -1,6 +1,7 @@
-"""Progress and messages of a run, by the standard logging.
+"""Progress and messages of a run, through the standard logging.
 
-Records of progress carry ``fraction`` (0 to 1, or None for a stage whose share is not known); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
+Progress records have the attribute ``fraction`` (0 to 1, or None for a stage with unknown fraction); all other records are lines of the
+log. The attribute ``job`` names the running job, ``sums_up`` its outcome.
 """
 
 import logging
@@ -16,8 +17,8 @@ from stickslip.errors import StickslipError
 from stickslip.study.store.atomic_write import unwritable
 
 LOG = logging.getLogger("stickslip")
-DONE = "done"  # what is told of a job at its end
-OF_RECORDS = ("fraction", "job", "verdict", "sums_up")  # what records of ours carry beside their text
+DONE = "done"  # state of a job at its end
+OF_RECORDS = ("fraction", "job", "verdict", "sums_up")  # additional attributes of our log records
 _JOB = ContextVar("job", default="")
 
 
@@ -31,7 +32,7 @@ def advance(fraction: float, text: str) -> None:
 
 
 def stage(text: str) -> None:
-    """Report what the running job does now, where its finished fraction is not known."""
+    """Report the present stage of the running job, if its finished fraction is unknown."""
     LOG.info(text, extra={"fraction": None, "job": _JOB.get()})
 
 
@@ -42,7 +43,7 @@ def tell(word: str, text: str) -> None:
 
 
 def sum_up(text: str, line: str) -> None:
-    """Report the outcome of the running job: in few words, and as a line."""
+    """Report the outcome of the running job: in a few words, and as a line."""
     LOG.info(line, extra={"sums_up": text})
 
 
@@ -82,10 +83,10 @@ def written_down(path: Path) -> Iterator[None]:
     Raises
     ------
     InputError
-        If the file cannot be written, at any time.
+        If the file cannot be written, at the beginning or later.
     """
     try:
-        # names of files may hold bytes that are no UTF-8
+        # file names may contain bytes that are no UTF-8
         handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise unwritable(path, error) from None
@@ -101,15 +102,15 @@ def written_down(path: Path) -> Iterator[None]:
     finally:
         LOG.setLevel(level)
         LOG.removeHandler(handler)
-        with suppress(OSError):  # what was not written has been told
+        with suppress(OSError):  # the error was raised before
             handler.close()
 
 
 class _LogFile(logging.FileHandler):
-    """A log file that stops the run when it cannot be written; the standard library prints a traceback and continues."""
+    """A log file that stops the run if it cannot be written; the standard library would print a traceback and continue."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Raise an error on a full disk; in a thread that repeats lines of workers, the next line of this process raises it."""
+        """Raise an error on a full disk; if it occurs in a thread that repeats lines of workers, the next line here raises it."""
         error = sys.exc_info()[1]
         if not isinstance(error, OSError):
             super().handleError(record)
@@ -118,6 +119,6 @@ class _LogFile(logging.FileHandler):
 
 
 def _line(record: logging.LogRecord) -> bool:
-    """Return whether a record is a line of its own, and add its beginning."""
+    """Return whether a record is a line of the log, and add the beginning of the line."""
     record.head = head(record)
     return not hasattr(record, "fraction")

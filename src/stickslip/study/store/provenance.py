@@ -30,9 +30,9 @@ class Provenance:
     study_file
         Name of the study file; empty for a Python model.
     created
-        Time at which the run started that wrote the result.
+        Start of the run that wrote the result.
     began
-        The same time on a monotonic clock, s.
+        Start of the run on a monotonic clock, s.
     """
 
     title: str
@@ -59,7 +59,7 @@ class Provenance:
 
 
 def as_text(name: str) -> str:
-    """Return a file name with replacements for bytes that are not UTF-8, which neither results nor pages can hold."""
+    """Return a file name with replacements for bytes that are not UTF-8, which results and pages cannot contain."""
     return name.encode("utf-8", "backslashreplace").decode()
 
 

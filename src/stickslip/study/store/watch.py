@@ -18,10 +18,10 @@ from stickslip.study.store.progress import LOG, OF_RECORDS
 from stickslip.study.store.provenance import library_versions
 from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped
 
-ASIDE = "set aside"  # the note of a job that was
-TWICE = 2  # deaths of a job's process at the same place, after which it is set aside
-ON = 1.0  # seconds between two looks whether the run is still on
-UNKNOWN = (ImportError, AttributeError, pickle.PicklingError)  # what is not installed there
+ASIDE = "set aside"  # name of the note in a job that was set aside
+TWICE = 2  # abnormal ends of a job's process without progress, after which the job is set aside
+ON = 1.0  # seconds between two checks whether the run continues
+UNKNOWN = (ImportError, AttributeError, pickle.PicklingError)  # errors if the worker lacks a module of the job
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +41,9 @@ class Parcel:
     limits
         Limits on time and memory.
     owner
-        Owner of the file at work; empty: no other process may write it.
+        Process that owns the file of the running job; empty: only one process writes it.
     code
-        Code of the user that the job needs; None for none.
+        User's code that the job needs; None for none.
     """
 
     content: bytes
@@ -56,13 +56,13 @@ class Parcel:
 
     @property
     def file(self) -> Path:
-        """File of the job at work."""
+        """File of the running job."""
         return file_at_work(self.sealed, self.owner)
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Reply of another machine: the log lines of the job, and the exception it raised."""
+    """Reply of another machine: log lines of the job, and its exception."""
 
     host: str
     lines: list[dict[str, Any]]
@@ -72,7 +72,7 @@ class Answer:
 def watched(
     parcel: Parcel, cell: Cell, stopped: Callable[[], bool], hear: Callable[[logging.LogRecord], object]
 ) -> None:
-    """Solve a job in a process of its own. Set it aside if it takes too long, or if its process dies twice at the same place."""
+    """Solve a job in its own process. Set it aside if it takes too long, or if its process dies twice without progress."""
     with until_sealed_elsewhere(parcel.sealed, parcel.file):
         while True:
             try:
@@ -82,7 +82,7 @@ def watched(
             except OutOfTime as ended:
                 return set_aside(parcel, str(ended))
             except Ended as ended:
-                # kept in its file: the worker may be lost before it ends again
+                # the count is kept in the file, since this worker may be lost, too
                 with JobJournal(parcel.file) as journal:
                     deaths = journal.died()
                 if deaths >= TWICE:
@@ -93,7 +93,7 @@ def watched(
 
 
 def unpacked(parcel: Parcel) -> None:
-    """Unpack and solve a job; runs in the job's own process."""
+    """Unpack and solve a job, in the job's own process."""
     if parcel.code is not None:
         parcel.code.importable()
     try:
@@ -120,7 +120,7 @@ def set_aside(parcel: Parcel, why: str) -> None:
 
 
 def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: dict[str, str]) -> Answer:
-    """Solve a job on another machine, in a file used by this attempt only; stop when the run has ended."""
+    """Solve a job on another machine, in a file of this attempt only; stop when the run has ended."""
     lines: list[dict[str, Any]] = []
     host = socket.gethostname()
     own = replace(parcel, owner=new_owner())
@@ -128,7 +128,7 @@ def solve_far(parcel: Parcel, token: Path, versions: dict[str, str], threads: di
         _refuse_stranger(token, versions, host)
         with closing(Cell(threads)) as cell:
             watched(own, cell, _over(token), lambda record: _keep(record, lines))
-    except Exception as error:  # noqa: BLE001  it is raised where the run is
+    except Exception as error:  # noqa: BLE001  it is raised on the machine of the run
         error.__traceback__ = None
         return Answer(host, lines, error)
     return Answer(host, lines)
@@ -150,7 +150,7 @@ def _refuse_stranger(token: Path, versions: dict[str, str], host: str) -> None:
 
 
 def _over(token: Path) -> Callable[[], bool]:
-    """Return a function that says whether the run has ended: its token is missing twice, since a shared folder may be slow."""
+    """Return a function that tells whether the run has ended: its token is missing twice, since a shared folder may be slow."""
     looked, missed = [monotonic()], [0]
 
     def over() -> bool:

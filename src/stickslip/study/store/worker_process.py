@@ -24,21 +24,21 @@ from stickslip.errors import StickslipError, input_error
 from stickslip.model.blas_threads import BLAS_THREADS
 from stickslip.study.store.progress import LOG, OF_RECORDS
 
-EVERY = 0.1  # seconds between two looks at a process
-STATM = "/proc/{}/statm"  # where Linux says what memory a process takes
+EVERY = 0.1  # seconds between two checks of a process
+STATM = "/proc/{}/statm"  # Linux' file with the memory of a process
 SERVE = "import sys; sys.path[:] = {!r}; from stickslip.study.store.worker_process import serve; serve()"
 
 
 class Ended(StickslipError):  # noqa: N818  it tells what has happened
-    """The process ended before its job."""
+    """Error: the process ended before its job."""
 
 
 class OutOfTime(Ended):
-    """The process was terminated because the job took too long."""
+    """Error: the process was terminated because the job took too long."""
 
 
 class Stopped(Ended):
-    """The process was terminated because the run was stopped."""
+    """Error: the process was terminated because the run was stopped."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def check_memory_limit(limits: Limits) -> None:
 
 
 class Cell:
-    """A worker process that does one piece of work after another; it is started on demand, and again after an abnormal end.
+    """A worker process that executes one piece of work after another. It starts on demand, and again after an abnormal end.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Cell:
         stopped: Callable[[], bool],
         hear: Callable[[logging.LogRecord], object] = LOG.handle,
     ) -> Any:
-        """Return ``work(given)`` evaluated in the process, or raise its exception; log lines of the process are repeated here.
+        """Evaluate ``work(given)`` in the process; return the result or raise the exception. Its log lines are repeated here.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Cell:
             with suppress(Empty):
                 kind, content = self._said.get(timeout=EVERY)
                 if kind == "line":
-                    with suppress(OSError):  # a closed terminal, of which this process's own lines tell
+                    with suppress(OSError):  # a closed terminal, which this process's own log lines report
                         hear(logging.makeLogRecord(content))
                 elif kind == "done":
                     return content
@@ -123,7 +123,7 @@ class Cell:
                 self._look(process.pid, looked - began, limits, stopped)
 
     def close(self) -> None:
-        """End the process at once; journals hold only whole records, so nothing is lost."""
+        """End the process at once; journals contain only complete records, so nothing is lost."""
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -146,7 +146,7 @@ class Cell:
             raise Ended(f"took {taken:.2f} GB of memory, the limit of a job is {limits.memory_gb:g} GB")
 
     def started(self) -> subprocess.Popen[bytes]:
-        """Return the process, started if necessary; it accepts work before it is ready."""
+        """Return the process, started if necessary; work may be sent before it is ready."""
         if self._process is not None and self._process.poll() is None:
             return self._process
         self.close()
@@ -160,7 +160,7 @@ class Cell:
         )
         heard = (self._process.stdout, self._said)
         threading.Thread(target=_listen, args=heard, daemon=True).start()
-        # what multiprocessing tells a new process: with the user's script imported, classes of it are known there
+        # preparation as in multiprocessing: the process imports the user's script and so knows its classes
         told = get_preparation_data("stickslip")
         told.pop("authkey", None)
         _send(self._process.stdin, pickle.dumps((told, self._modules)))
@@ -190,7 +190,7 @@ def blas_threads() -> dict[str, str]:
 
 
 def _how(code: int) -> str:
-    """Describe in words how a process has ended."""
+    """Return a sentence fragment about the end of a process."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:
@@ -210,7 +210,7 @@ def _send(stream: IO[bytes] | None, message: bytes) -> None:
 
 
 def _listen(stream: IO[bytes], said: "SimpleQueue[tuple[str, Any]]") -> None:
-    """Put the messages of a process into a queue, at last its end."""
+    """Put the messages of a process into a queue, and finally a message about its end."""
     with stream, suppress(EOFError, OSError, pickle.UnpicklingError):
         while True:
             said.put(_understood(pickle.load(stream)))
@@ -220,18 +220,18 @@ def _listen(stream: IO[bytes], said: "SimpleQueue[tuple[str, Any]]") -> None:
 def _understood(message: bytes) -> tuple[str, Any]:
     try:
         kind, content = pickle.loads(message)
-    except Exception as error:  # noqa: BLE001  an exception of the user's, that cannot be made anew
+    except Exception as error:  # noqa: BLE001  a user's exception that cannot be unpickled
         return "raised", StickslipError(f"a job ended with what cannot be sent ({error})")
     return str(kind), content
 
 
 def serve() -> None:
-    """Do pieces of work until the connection closes: the main loop of the process of a `Cell`."""
-    with suppress(ValueError):  # of a thread that is not the first: there is none
+    """Execute pieces of work until the connection closes: the main loop of the process of a `Cell`."""
+    with suppress(ValueError):  # only the main thread may set signal handlers
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     heard: SimpleQueue[bytes] = SimpleQueue()
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print must not come between
+    os.dup2(2, 1)  # output of libraries must not mix with messages
     threading.Thread(target=_hear, args=(os.fdopen(os.dup(0), "rb"), heard), daemon=True).start()
     say = _speaker(out)
     LOG.addHandler(_Lines(say))
@@ -246,7 +246,7 @@ def serve() -> None:
         try:
             work, given = pickle.loads(message)
             answer = ("done", work(given))
-        except BaseException as error:  # noqa: BLE001  whatever it is, the other end raises it
+        except BaseException as error:  # noqa: BLE001  the parent raises it
             error.add_note("".join(traceback.format_exception(error)))
             answer = ("raised", error)
         say(*answer)
@@ -280,7 +280,7 @@ def _speaker(out: IO[bytes]) -> Callable[[str, Any], None]:
     def say(kind: str, content: Any) -> None:
         try:
             message = pickle.dumps((kind, content))
-        except Exception as error:  # noqa: BLE001  classes of the user's may refuse in any way
+        except Exception as error:  # noqa: BLE001  the user's classes may raise any exception
             own = StickslipError(f"a job ended with what cannot be sent: {content!r} ({error})")
             message = pickle.dumps(("raised", own))
         with lock:
@@ -290,7 +290,7 @@ def _speaker(out: IO[bytes]) -> Callable[[str, Any], None]:
 
 
 class _Lines(logging.Handler):
-    """Sends log lines and progress of this process to the parent."""
+    """Handler that sends log lines and progress of this process to the parent."""
 
     def __init__(self, say: Callable[[str, Any], None]) -> None:
         super().__init__()

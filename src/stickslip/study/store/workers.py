@@ -1,6 +1,6 @@
-"""Executors of jobs: this process, worker processes, other machines; the same numbers to the last bit.
+"""Executors of jobs: this process, worker processes, or other machines, all with bit-identical results.
 
-Each executor is a function that gives `Hands`: what takes a job, and how many at a time.
+Each executor is a context manager that yields `Hands`: an executor with its capacity.
 """
 
 import os
@@ -23,16 +23,16 @@ from stickslip.study.store.worker_process import Cell, blas_threads
 T = TypeVar("T")
 
 LOOPBACK = "127.0.0.1"
-WARM = ("stickslip.study.jobs",)  # what a process for jobs imports while models are built
-ALL = 1_000_000  # jobs at a time, where the other side puts them into a queue
-PATIENCE = 15  # seconds for a scheduler to answer, and for its first worker
+WARM = ("stickslip.study.jobs",)  # modules that a worker process imports while models are built
+ALL = 1_000_000  # jobs submitted at a time if the executor has its own queue
+PATIENCE = 15  # seconds to wait for a scheduler's answer, and for its first worker
 
 
 class InProcess(Executor):
     """An executor without processes: `submit` returns when the work is done, and raises its exceptions."""
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Do the work on copies of its arguments, as a worker process would."""
+        """Execute the function on copies of its arguments, as a worker process would."""
         future: Future[T] = Future()
         copies = pickle.loads(pickle.dumps(args))
         future.set_result(fn(*copies, **kwargs))
@@ -50,13 +50,13 @@ class Hands:
     room
         Number of jobs submitted at a time.
     cell
-        Context manager that lends a process for a job; None: a job runs where it is submitted to.
+        Context manager that lends a process for a job; None: the executor itself runs the job.
     far
-        Whether jobs may run on other machines, and their log lines come back when they have ended.
+        Whether jobs may run on other machines; their log lines then arrive when they end.
     over
-        Set at the end of the run.
+        Event that is set at the end of the run.
     trouble
-        Function that says why there may be no progress; empty if no reason is known.
+        Function that returns a reason for lack of progress; empty if no reason is known.
     """
 
     pool: Executor
@@ -75,8 +75,8 @@ def here() -> Iterator[Hands]:
 
 @contextmanager
 def cells(workers: int) -> Iterator[Hands]:
-    """Yield worker processes on this machine, started at once; they end with the block, and with this process however it ends."""
-    one_blas_thread()  # the processes inherit it
+    """Yield worker processes on this machine, started at once; they end with the block or with this process."""
+    one_blas_thread()  # the processes inherit the setting
     made = [Cell(blas_threads(), WARM) for _ in range(workers)]
     free: SimpleQueue[Cell] = SimpleQueue()
     for one in made:
@@ -163,7 +163,7 @@ def allocated(kind: str, address: str, workers: int) -> Iterator[Hands]:
 
 
 def _in_allocation(address: str, workers: int) -> int:
-    """Return the number of jobs that a SLURM allocation takes at a time; refuse an allocation in which jobs would hang."""
+    """Return the number of jobs that a SLURM allocation runs at a time; refuse an allocation in which jobs would hang."""
     if shutil.which("srun") is None:
         raise input_error("--executor slurm", "finds no srun here", "Run it where SLURM is.")
     if "SLURM_JOB_ID" not in os.environ:
@@ -187,7 +187,7 @@ def _in_allocation(address: str, workers: int) -> int:
 @contextmanager
 def _far(pool: Executor, room: int, trouble: Callable[[], str] = str) -> Iterator[Hands]:
     """Yield an executor whose jobs end when the run is over."""
-    one_blas_thread()  # jobs take as many as this process says
+    one_blas_thread()  # jobs use the number of threads set in this process
     try:
         yield Hands(pool, room, far=True, trouble=trouble)
     finally:
@@ -196,7 +196,7 @@ def _far(pool: Executor, room: int, trouble: Callable[[], str] = str) -> Iterato
 
 @contextmanager
 def _bound(address: str) -> Iterator[None]:
-    """Make executorlib listen on one address only: by default it listens on all, and unpickles what it receives."""
+    """Make executorlib listen on one address only: by default it listens on all and unpickles everything it receives."""
     from executorlib.standalone.interactive.communication import SocketInterface
 
     before = SocketInterface.bind_to_random_port
@@ -240,11 +240,11 @@ def executor(kind: "str | Executor", workers: int, *, apart: bool = False) -> It
     workers
         Number of processes; 1: this process.
     apart
-        Whether a single worker is a process of its own.
+        Whether a single worker has its own process.
     """
     if not isinstance(kind, str):
         one_blas_thread()
-        yield Hands(kind, ALL, far=True)  # the user's, which stays open
+        yield Hands(kind, ALL, far=True)  # the user's executor, which stays open
         return
     word, _, address = kind.partition("=")
     if not kind:

@@ -10,7 +10,7 @@ from stickslip.study.file.section import FilePath, Name, Positive, Section, cust
 
 
 class AeroPoint(Section):
-    """A point, or a node set as a whole, that coefficients belong to."""
+    """A point, or a whole node set, whose motion and force the coefficients relate."""
 
     on: Name = Field(
         description='a node set ("blade.tip": force shared equally, mean displacement), a node ("blade.node12") or a dof'

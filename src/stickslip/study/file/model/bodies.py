@@ -1,4 +1,4 @@
-"""The tables [part.NAME] of rigid bodies: ready shapes, points of one's own, and how body axes are put in their place."""
+"""The tables [part.NAME] of rigid bodies: ready shapes, the user's own points, and the placement of the body axes."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -14,7 +14,7 @@ from stickslip.study.file.section import Name, Positive, Section, custom_error, 
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Triple = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-ALONG = 1e-6  # sine of the angle with a normal, below which a direction is no tangent
+ALONG = 1e-6  # sine of the angle between a direction and the normal, below which it is no tangent
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -24,7 +24,7 @@ def shape(name: str) -> tuple[Any, Any]:
 
 
 class Placed(Section):
-    """One step of how a part is put in its place: mirrored, then turned, then moved."""
+    """One step of the placement of a part: mirrored, then turned, then moved."""
 
     mirror: Literal["x", "y", "z"] | None = Field(
         None, description="direction that a mirror through the origin turns round: x, y or z"
@@ -59,7 +59,7 @@ class Placed(Section):
 
     @property
     def new_axes(self) -> FloatArray:
-        """(3, 3) matrix of the turn that `axes` names."""
+        """(3, 3) matrix of the rotation that `axes` names."""
         columns = [np.array(AXES[word[-1]]) * (-1.0 if word.startswith("-") else 1.0) for word in self.axes or "xyz"]
         return np.column_stack(columns)
 
@@ -90,7 +90,7 @@ Cylinder = table_of(CylinderDamper, name="Cylinder", shape=shape("cylinder"), pl
 
 
 class Surface(Section):
-    """Points of a rigid body that touch something, in the axes of the body."""
+    """Contact points of a rigid body, in the axes of the body."""
 
     points_m: list[Triple] = Field(
         min_length=1, max_length=10_000, description="positions [x, y, z] of its points in m"

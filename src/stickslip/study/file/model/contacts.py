@@ -31,7 +31,7 @@ POPULATIONS: dict[str, type] = {
     "uniform_band": UniformBand,
     "four_parameter": FourParameter,
     "first_loading": FirstLoading,
-}  # of the sliders of the law iwan
+}  # distributions of the sliders of the law iwan
 _TABLES = {
     name: table_of(cls, name=cls.__name__, kind=(Literal[name], Field(description=f'kind = "{name}"')))
     for name, cls in POPULATIONS.items()
@@ -94,7 +94,7 @@ class Pair(Section):
 
 
 class JoinTable(Pair):
-    """Two surfaces tied to each other for good: the first follows the second."""
+    """Two surfaces that are tied permanently: the first follows the second."""
 
     pairing: PairingKind | Literal["spatial_harmonics"] = Field(
         "node_to_segment",
@@ -188,7 +188,7 @@ class ContactBase(Pair):
 
     @property
     def preload(self) -> float:
-        """Normal force at rest, N, or pressure, Pa, as `per` says."""
+        """Normal force at rest, N, or pressure, Pa, depending on `per`."""
         return float(getattr(self, self._preload_key) or 0.0)
 
     def library(self) -> ContactLaw:
@@ -238,7 +238,7 @@ def _owners(key: str, *, per_area: bool) -> list[str]:
 
 def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
     law, key, per = info.data.get("law"), str(info.field_name), info.data.get("per")
-    if law is None or per is None:  # unknown, which is told already
+    if law is None or per is None:  # unknown, which has its own error
         return value
     area = per == "area"
     known = keys_of(law, per_area=area)

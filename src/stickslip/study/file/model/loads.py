@@ -16,7 +16,7 @@ HIGHEST_ORDER = 1000
 
 
 def unit_direction(given: Any) -> Any:
-    """Return the unit vector of a direction: an axis, with a sign or without, or a vector."""
+    """Return the unit vector of a direction: an axis, with or without a sign, or a vector."""
     if given is None:
         return None
     if isinstance(given, str) and given.removeprefix("-") in AXES:
@@ -105,7 +105,7 @@ class LoadTable(Section):
 
 
 class Rotation(Section):
-    """The rotor's speed and which of its effects are kept."""
+    """The rotor's speed, and the effects of rotation that are kept."""
 
     speed_rpm: Speed = Field(0.0, description="speed in rpm; 0 is the wheel at rest")
     tangent: Literal["consistent", "textbook"] = Field(
@@ -136,7 +136,7 @@ def _point(given: Any) -> Any:
 
 
 class Output(Section):
-    """Where motion is reported, and where the results go."""
+    """Points whose motion is reported, and the folder of the results."""
 
     folder: str = Field(
         "results", min_length=1, max_length=200, validate_default=True, description="a folder inside the study's folder"
@@ -174,12 +174,12 @@ class Output(Section):
     @field_validator("folder")
     @classmethod
     def _stays_inside(cls, name: str, info: ValidationInfo) -> str:
-        """Links are followed before the check; without the context of a study file only the name is judged."""
+        """Refuse a folder outside the study's folder, after following links; without a study file only the name is checked."""
         relative, remedy = Path(name), "Give a plain relative name such as 'results'."
         if not name.isprintable() or relative.is_absolute() or ".." in relative.parts or relative == Path():
             raise custom_error(f"must be a folder inside the study's folder, got {name!r}", remedy)
         home = Path(realpath((info.context or {}).get("study", "study.toml"))).parent
-        target = Path(realpath(home / relative))  # of a link to itself the link, which the run refuses
+        target = Path(realpath(home / relative))  # a link to itself stays a link, which the run refuses
         if target == home or not target.is_relative_to(home):
             raise custom_error(
                 f"leads out of the study's folder, got {name!r}, which is a link to {target}",
@@ -189,7 +189,7 @@ class Output(Section):
 
 
 class Retention(Section):
-    """A weak spring from rigid bodies to the ground, for states in which friction leaves their mean position free."""
+    """A weak spring from rigid bodies to the ground, for states in which friction does not determine their mean position."""
 
     stiffness_n_per_m: float = Field(
         0.0, ge=0, description="stiffness in N/m that holds a body's mean position, 0 for none"

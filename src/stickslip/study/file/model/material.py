@@ -16,10 +16,10 @@ from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
 from stickslip.study.own_code import is_address
 
-FEW = 25  # fixed-interface modes where the study does not say
+FEW = 25  # default number of fixed-interface modes
 OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
 MODES_OF = tuple(OWN_MODES.values())
-# what a number may have been meant in, for messages
+# units in which a number may have been meant, for messages
 STRESSES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
 DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
 
@@ -35,7 +35,7 @@ class _PlausibleMaterial(Section):
     @field_validator("young_modulus_pa", "density_kg_per_m3", check_fields=False)
     @classmethod
     def _is_of_a_solid(cls, value: float, info: ValidationInfo) -> float:
-        """Refuse what no solid has, as the readers of decks do."""
+        """Refuse a value that no solid has, as the readers of decks do."""
         stiff = info.field_name == "young_modulus_pa"
         (low, high), unit = (MODULI, "Pa") if stiff else (SOLIDS, "kg/m³")
         if low <= value <= high or not info.data.get("plausible", True):
@@ -68,7 +68,7 @@ def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo)
 
 
 class ReductionTable(Section):
-    """Reduction of a part: what contacts, loads and outputs need stays physical, the rest becomes a few modes."""
+    """Reduction of a part: dofs of contacts, loads and outputs stay physical, the others are replaced by a few modes."""
 
     method: Annotated[Literal["craig_bampton", "rubin", "none"], WrapValidator(_named_or_own)] = Field(
         "craig_bampton",
@@ -124,7 +124,7 @@ class ReductionTable(Section):
         return self
 
     def library(self) -> Reduction | None:
-        """Return the reduction; None for none. A reduction of the user is made where parts are."""
+        """Return the reduction; None for none. A user's reduction is made together with the parts."""
         if self.method == "none":
             return None
         return Reduction(self._n_modes(), self.method)
@@ -138,7 +138,7 @@ class ReductionTable(Section):
 
 
 class StudyReduction(ReductionTable):
-    """Reduction of all parts without their own, and of the surfaces that joins tie."""
+    """Reduction of all parts without a reduction of their own, and of joined surfaces."""
 
     interface_modes: Annotated[int, Field(ge=1, le=2000)] | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""The tables [mistuning.NAME]: blades, contacts and sectors that differ."""
+"""The tables [mistuning.NAME]: differences between blades, contacts and sectors."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
@@ -8,12 +8,12 @@ from pydantic_core import PydanticCustomError
 
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, refuse_all
 
-MODES = 6  # blade-alone modes that carry a deviation where the study does not say
-MOST_MODES = 200  # of a blade that a study or a file may name
+MODES = 6  # default number of blade-alone modes to which a deviation applies
+MOST_MODES = 200  # largest number of a blade's mode in a study or a file
 Deviation = Annotated[float, Field(ge=-0.5, le=0.5)]
 KINDS = ("of", "contact", "part")
 WAYS = ("deviations", "gaps_m", "distribution", "file")
-# keys that mean something beside another one alone
+# key -> the key without which it has no meaning
 BESIDE = {
     "beyond_radius_m": "of",
     "modes": "of",
@@ -27,7 +27,7 @@ BESIDE = {
 
 
 class MistuningTable(Section):
-    """Mistuning: differences between sectors of blades (`of`), of a contact (`contact`), or of the part of one sector (`part`)."""
+    """Mistuning: sectors differ in their blades (`of`), in a contact (`contact`), or one sector in a part (`part`)."""
 
     of: Name | None = Field(
         None, description='blades that differ: a part, or a node set of one such as "blade.airfoil"'

@@ -21,7 +21,7 @@ Pair = Annotated[list[Triple], Field(min_length=2, max_length=2)]
 
 
 class SetTable(Section):
-    """A node set: the nodes that all of its conditions hold for."""
+    """A node set: the nodes that satisfy all of its conditions."""
 
     pattern: str | None = Field(
         None,
@@ -57,7 +57,7 @@ class SetTable(Section):
 
 
 class PartTable(Section):
-    """Keys of every part with modes of its own."""
+    """Common keys of parts that have modes."""
 
     material: MaterialTable | None = Field(
         None, description="the table of its material; left out: the table [material]"
@@ -312,7 +312,7 @@ def _known_kind(given: Any) -> Any:
 
 
 def union_of(kinds: dict[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
-    """Return the union type of several kinds of a table; `which` tells the kind of a given table."""
+    """Return the union type of several kinds of a table; `which` returns the kind of a given table."""
     members = tuple(Annotated[table, Tag(kind)] for kind, table in kinds.items())
     joined: Any = members[0]
     for member in members[1:]:
