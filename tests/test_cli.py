@@ -175,7 +175,7 @@ def test_check_estimates_its_time_before_heavy_libraries_are_imported(tmp_path: 
         f"read(Path({str(path)!r}), lambda line: print(line, [m for m in ('numba', 'xarray', 'stickslip.study.run') if m in sys.modules]))"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert re.fullmatch(r"checking one case: parts of about [\d.e+]+ nodes take some \d+ s \[\]\n", told), told
+    assert re.fullmatch(r"checking one case: parts of about [1-9][\d,]* nodes take some \d+ s \[\]\n", told), told
 
 
 def test_new_overwrites_no_deck(tmp_path: Path) -> None:
@@ -266,6 +266,12 @@ def test_check_says_once_what_holds_for_all_cases(tmp_path: Path) -> None:
     assert said.count("force 5 N") == 1
     assert len([line for line in said if "natural frequencies, contacts open" in line]) == 1
     assert "the same holds for: force 8 N, 9 N" in said
+    total = next(line for line in said if line.startswith("all 3 cases: "))
+    least, most = re.fullmatch(r"all 3 cases: (\d+) s to (\d+) s to solve on one core", total).groups()  # type: ignore[union-attr]
+    of_one = re.search(r"([\d.]+) to ([\d.]+) s to solve this case", "\n".join(said))
+    assert of_one is not None
+    assert int(most) == pytest.approx(3 * float(of_one[2]), abs=1.0 + 1.5)  # both are rounded to a second or a digit
+    assert int(least) <= int(most)
     sentences = [text.split() for line in said for text in re.split(r"; |\. ", line)]
     assert [" ".join(words) for words in sentences if len(words) > 20] == []
 

@@ -184,12 +184,15 @@ class Advice:
         States of contacts and dampers under the static loads.
     beside
         Context of the frequency range: natural frequencies, and the possible effect of friction.
+    solving_s
+        Least and largest time on one core to solve the case, s; zero if not estimated.
     """
 
     computed: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     at_rest: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
+    solving_s: tuple[float, float] = (0.0, 0.0)
 
 
 def of_tables(*tables: str) -> Callable[[Case], str]:

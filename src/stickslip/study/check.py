@@ -23,6 +23,7 @@ SECTIONS = {
     "beside": "What stands beside the range",
 }  # field of `Advice` -> heading
 DOUBTFUL = "doubtful"
+START_S = 5.0  # of CPU: importing the libraries and loading compiled functions
 NO_DOUBT = "nothing that can be seen without solving"
 
 
@@ -35,7 +36,7 @@ def check_study(study: Study) -> tuple[str, ...]:
         If the study cannot be run.
     """
     asked = asked_for(study)
-    told = Advice()
+    told, solving_s = Advice(), np.zeros(2)
     alike: list[str] = []
     for case in study.cases():
         with told_when_slow(case.label), of_task(study, case):
@@ -48,6 +49,7 @@ def check_study(study: Study) -> tuple[str, ...]:
             every += [_as_advice(one.check(case, model)) for one in asked]
             every += [Advice(at_rest=tuple(_free(model)))]
         # a line that is the same for all cases is logged once
+        solving_s += np.sum([one.solving_s for one in every], axis=0)
         new, first = _new(every, told), told == Advice()
         told = _joined([told, new])
         if first and not new.doubts:
@@ -61,6 +63,10 @@ def check_study(study: Study) -> tuple[str, ...]:
         LOG.info(measured.sentence)
     if alike:
         LOG.info(f"the same holds for: {together(alike)}")
+    if len(study.cases()) > 1 and solving_s[1] > 0.0:
+        least, most = (f"{s / 60:.0f} min" if s >= 120.0 else f"{s:.0f} s" for s in solving_s)
+        LOG.info(f"all {len(study.cases())} cases: {least} to {most} to solve on one core")
+        LOG.info(f"parts, stability, time integration and some {START_S:.0f} s to start come on top")
     return told.doubts
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stickslip.analyses.forced_response.estimate import estimate
+from stickslip.analyses.forced_response.estimate import Estimate, estimate
 from stickslip.analyses.forced_response.physics.known import (
     LISTED,
     RIGID,
@@ -54,8 +54,9 @@ def advice(case: Case, model: Model) -> Advice:
         *mixed_places(question.model.error_labels),
         *(v for v in known if v.rank),
     ]
+    cost = estimate(model, question.sweep) if question.stepping is None else None
     return Advice(
-        computed=_computed(case, model, question),
+        computed=_computed(case, model, question, cost),
         doubts=(*doubted, *(f"{v.why}. {v.remedy}" for v in doubts), *units_in_doubt(question, model)),
         at_rest=(*contacts_at_rest(question), *damper_lines(statics)),
         beside=(
@@ -64,25 +65,26 @@ def advice(case: Case, model: Model) -> Advice:
             *_of_friction(physics),
             *_notes(question),
         ),
+        solving_s=(0.0, 0.0) if cost is None else (cost.least_seconds, cost.most_seconds),
     )
 
 
-def _computed(case: Case, model: Model, question: Question) -> tuple[str, ...]:
+def _computed(case: Case, model: Model, question: Question, cost: Estimate | None) -> tuple[str, ...]:
     """Return lines on the computation and its cost."""
     lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
     return (
         f"sweep: {lowest:.2f} to {highest:.2f} Hz",
         *of_pressures(case, model),
-        *_of_method(case, model, question),
+        *_of_method(case, question, cost),
     )
 
 
-def _of_method(case: Case, model: Model, question: Question) -> tuple[str, ...]:
+def _of_method(case: Case, question: Question, cost: Estimate | None) -> tuple[str, ...]:
     """Return lines on balance or shooting."""
     if question.stepping is not None:
         return (*question.orders_lines, *shooting_lines(question.model, question.sweep, question.stepping))
     return (
-        *estimate(model, question.sweep).lines,
+        *(() if cost is None else cost.lines),
         *unreduced_line(question.model),
         *question.orders_lines,
         *(f"harmonics: {line}" for line in question.chooser.lines(case.settings.harmonics.passages)),

@@ -1,5 +1,7 @@
 """Estimated size and time of ``stickslip check``, before files are read and heavy libraries are imported."""
 
+import math
+
 from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.checks import sectors_of
@@ -13,7 +15,13 @@ def before_check(file: StudyFile) -> str:
     seconds = max(nodes * (SECONDS_A_NODE + SECONDS_A_WAVE * (waves or 0)), 1.0)
     of_waves = f" (a wheel {nodes * SECONDS_A_WAVE:.2g} s more for each wave)" if waves is None else ""
     cases = f"{count} cases" if count > 1 else "one case"
-    return f"checking {cases}: parts of about {max(nodes, 1.0):.2g} nodes take some {seconds:.0f} s{of_waves}"
+    return f"checking {cases}: parts of about {_rounded(nodes)} nodes take some {seconds:.0f} s{of_waves}"
+
+
+def _rounded(nodes: float) -> str:
+    """Return a number of nodes with two digits: ``54,000``."""
+    size = max(nodes, 1.0)
+    return f"{round(size, 1 - math.floor(math.log10(size))):,.0f}"
 
 
 def _waves(tables: Tables) -> int | None:

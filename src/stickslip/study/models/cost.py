@@ -77,7 +77,7 @@ def _nodes(table: Any, home: Path) -> float:
         return file_nodes(home / table.file)
     if isinstance(table, BeamTable):
         return float(table.elements)  # type: ignore[attr-defined]
-    return len(table.masses_kg) / 3 if isinstance(table, Lumped) else 0.0
+    return float(len(table.masses_kg)) if isinstance(table, Lumped) else 0.0
 
 
 def blade_nodes(b: BladePair) -> float:
