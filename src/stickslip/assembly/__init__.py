@@ -1,4 +1,4 @@
-"""Parts, contacts and loads assembled into a model, and the model as solvers see it."""
+"""Assembly of parts, contacts and loads to a model, and the input of the solvers."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""A model as solvers and results see it."""
+"""The assembled model, the input of solvers and results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,19 +9,19 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.system import System
 
-CHECKED = 5  # natural frequencies that must agree
-AGREEMENT = 1e-3  # relative
-RIGID = 1e-4  # of the highest frequency: below, rounding
+CHECKED = 5  # number of natural frequencies that must agree
+AGREEMENT = 1e-3  # largest relative error
+RIGID = 1e-4  # share of the highest frequency below which a frequency is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTable:
-    """Table of the contact points, as results report them.
+    """Table of the contact points for results.
 
     Parameters
     ----------
     names
-        Names of the points: ``contact.point``, or the point's own name where the surface has names.
+        Names of the points: ``contact.point``, or the point's own name if the surface has names.
     groups
         Name of the contact of each point.
     laws
@@ -31,7 +31,7 @@ class ContactTable:
     frame
         (p, 3, 3) columns t, w, n.
     area
-        (p,) in m²; NaN where there are no facets.
+        (p,) in m²; NaN without facets.
     """
 
     names: tuple[str, ...]
@@ -44,7 +44,7 @@ class ContactTable:
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The skin of the parts, for pictures.
+    """Outer surface of the parts, for pictures.
 
     Parameters
     ----------
@@ -63,9 +63,10 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class Frequencies:
-    """Natural frequencies in Hz of the full and the reduced model, contacts open (without free rigid bodies) and stuck.
+    """Natural frequencies in Hz of the full and the reduced model, with open and with stuck contacts.
 
-    On a wheel they belong to the wave in which the lowest driven harmonic travels.
+    Open contacts are without free rigid bodies. On a wheel they are those of the wave in which the lowest driven
+    harmonic travels.
     """
 
     free_full: FloatArray
@@ -99,7 +100,7 @@ class Frequencies:
 
 
 def _errors(full: FloatArray, reduced: FloatArray) -> FloatArray:
-    """Return relative errors of frequencies; zero for the modes of a body that nothing holds, as a damper without friction."""
+    """Return relative errors of frequencies; zero for rigid-body modes, as of a damper without friction."""
     moves = full > RIGID * full.max(initial=0.0)
     return np.where(moves, reduced / np.where(moves, full, 1.0) - 1.0, 0.0)
 
@@ -136,7 +137,7 @@ class Blades:
 
 @dataclass(frozen=True, eq=False)
 class Assembled:
-    """Reduced model with paired contacts under its static load. It holds arrays only and can be pickled.
+    """Reduced model with paired contacts under its static load. It contains only arrays and can be pickled.
 
     Parameters
     ----------
@@ -161,17 +162,18 @@ class Assembled:
     frequencies
         Natural frequencies of the full and the reduced model.
     skin
-        Outer surface for pictures; None where no part has a mesh.
+        Outer surface for pictures; None if no part has a mesh.
     sectors, engine_order
-        Number of sectors and engine order of the wheel; 1 and None for a single structure. For several engine orders their base m_0.
+        Number of sectors and engine order of the wheel; 1 and None for a single structure. For several engine orders,
+        their base m_0.
     counts
         Numbers of ``nodes``, ``dofs``, ``reduced`` and ``retained`` coordinates.
     warnings
         Warnings for the user.
     blades
-        Outputs of all sectors of a mistuned wheel; None where one sector stands for all.
+        Outputs of all sectors of a mistuned wheel; None if one sector represents all.
     orders
-        Engine order of each harmonic that loads drive; none for a single structure.
+        Engine order of each harmonic that loads drive; empty for a single structure.
     """
 
     system: System

@@ -1,4 +1,4 @@
-"""Assembly of a model: a single structure, a tuned wheel, or a wheel whose sectors differ; and with more modes for comparison."""
+"""Assembly of a single structure, a tuned or a mistuned wheel; also with more modes, for comparison."""
 
 from dataclasses import replace
 from math import ceil
@@ -15,8 +15,8 @@ from stickslip.model.part import Part
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
 
-MORE = 1.5  # times as many modes, or modes up to such a frequency
-FINER = 4.0  # where an error of frequencies is asked for: it is to be so many times smaller
+MORE = 1.5  # factor on the number of modes, or on the frequency up to which modes are kept
+FINER = 4.0  # factor by which a requested error of frequencies is reduced
 REMEMBERED_AS = "with more modes"
 
 
@@ -32,12 +32,13 @@ def assemble(
     harmonics
         Highest harmonic of the response.
     store
-        Cache of reductions: a function of a key text and of a function that computes named arrays. It returns the arrays, from an
-        earlier run where it has them.
+        Cache of reductions: a function of a key text and of a function that computes named arrays. It returns the
+        arrays, from an earlier run if available.
     wave_number
-        Wave number of a self-excited motion of a wheel; harmonic loads are then left out. None: it follows from the loads.
+        Wave number of a self-excited motion of a wheel; harmonic loads are then left out. None: it follows from the
+        loads.
     every_wave
-        Whether all waves of a wheel are reduced. Stability against every wave needs them.
+        Whether all waves of a wheel are reduced, as for stability against every wave.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def assemble(
 
 
 def with_more_modes(model: Model) -> Model | None:
-    """Return the model with half again as many modes; None where its parts keep all modes already."""
+    """Return the model with half again as many modes; None if its parts keep all modes already."""
     own = {name: _more(part) for name, part in model.parts.items()}
     if all(own[name] is part for name, part in model.parts.items()):
         return None
@@ -63,7 +64,7 @@ def with_more_modes(model: Model) -> Model | None:
 
 
 def more_modes(model: Model, harmonics: int, store: Store) -> Assembled | None:
-    """Assemble a model with half again as many modes; None where it keeps all modes already, or the reduction fails.
+    """Assemble a model with half again as many modes; None if it keeps all modes already, or the reduction fails.
 
     Parameters
     ----------
@@ -77,12 +78,15 @@ def more_modes(model: Model, harmonics: int, store: Store) -> Assembled | None:
         return None
     try:
         return assemble_tuned(more, harmonics, store, checked=False)
-    except StickslipError:  # an error of frequencies that takes too many modes
+    except StickslipError:  # the requested error of frequencies takes too many modes
         return None
 
 
 def _more(part: Part) -> Part:
-    """Return a part with more modes, the same for every model that it belongs to; the part itself where it keeps all."""
+    """Return a part with more modes, the same object for every model that contains it.
+
+    If a part keeps all modes, it is returned unchanged.
+    """
     reduction: Any = part.reduction
     if part.body is not None or not isinstance(reduction, Reduction):
         return part

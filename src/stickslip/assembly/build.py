@@ -1,4 +1,4 @@
-"""Assembly of a model: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
+"""Assembly of a model: reduction and joining of parts, pairing of contacts, and static loads."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,14 +36,14 @@ from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.equilibrium import preload, pressed_by, static_contact_force
 from stickslip.response.system import System
 
-MODES = 10  # natural frequencies compared
+MODES = 10  # number of natural frequencies that are compared
 UNKNOWN = Frequencies(*(np.zeros(0),) * 4)
 INTERFACE_MODES = "reduction.interface_modes"
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Linear part of a reduced model: everything but the contact forces.
+    """Linear part of a reduced model, without the contact forces.
 
     Parameters
     ----------
@@ -54,15 +54,18 @@ class Linear:
     steady
         (n,) static load of steady rotation, N.
     of_dofs
-        Dofs of all parts -> coordinates. The second argument is the study key, for messages.
+        Function from dofs of all parts to coordinates. The second argument is the study key, for messages.
     load
-        Force on the dofs of all parts and harmonic -> force on the coordinates.
+        Function from a force on the dofs of all parts and a harmonic to the force on the coordinates.
     of_wave
-        Wave number -> structure with the modes of the reduced model, its gaps, and the map from dofs of all parts to its coordinates.
+        Function from a wave number to the structure with the modes of the reduced model, its gaps, and the map from
+        dofs of all parts to its coordinates.
     field
-        Name of a load of `Model.spread` and harmonic -> load on the coordinates; None without such loads.
+        Function from the name of a load of `Model.spread` and a harmonic to the load on the coordinates; None without
+        such loads.
     expand
-        Coordinates and harmonic -> all dofs of all parts. It exists only with the store `with_ways_back`.
+        Function from coordinates and a harmonic to all dofs of all parts. It exists only with the store
+        `with_ways_back`.
     """
 
     side: LinearSide
@@ -219,7 +222,7 @@ def flow_around(model: Model, store: Store = in_memory, speed: float | None = No
 
 
 def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
-    """Return all dofs that stay physical, `kept` included, and those among them that no interface modes replace."""
+    """Return all dofs that stay physical, `kept` included, and those of them that interface modes do not replace."""
     pairs, ties = model.pairs, model.ties
     used = [operator.nonzero()[1] for operator in (pairs.own, pairs.following, ties.weights)]
     needed = np.unique(np.concatenate([kept, *used[:2], model.places.bodies()]))
@@ -227,7 +230,10 @@ def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Store) -> Linear:
-    """Reduce a single structure; `dofs` are those kept, those that no shapes replace, and those that stay coordinates."""
+    """Reduce a single structure.
+
+    `dofs` are the kept ones, those that interface modes must not replace, and those that must stay coordinates.
+    """
     kept, needed, stay = dofs
     mine = {name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name) for name in model.parts}
     parts = reduced_parts(model.parts, mine, model.spin(model.speed), model.steady, store)
@@ -277,7 +283,7 @@ def _free_dofs(model: Model) -> IntArray:
 
 
 def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> HarmonicLoad:
-    """Return the load on the coordinates: static forces with those of steady rotation, and harmonics."""
+    """Return the load on the coordinates: static forces, including steady rotation, and harmonics."""
     static = np.zeros(linear.side.n)
     if model.centrifugal and model.speed > 0:
         static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
@@ -293,7 +299,7 @@ def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> Harm
 
 
 def _first(model: Model) -> int:
-    """Return the lowest harmonic that a load drives; 1 where none does."""
+    """Return the lowest harmonic that a load drives; 1 without such a load."""
     return min((h for h in model.driven.values() if h), default=1)
 
 
@@ -307,7 +313,10 @@ def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, F
 
 
 def holding_points(model: Model, contacts: ContactsAs) -> BoolArray:
-    """Return which contact points (p,) stick in small vibrations: ``stuck``: all; ``open``: none; ``static``: those pressed at rest."""
+    """Return whether contact points (p,) stick in small vibrations.
+
+    ``stuck``: all; ``open``: none; ``static``: those pressed at rest.
+    """
     p = len(model.pairs.names)
     if contacts != "static" or not p:
         return np.full(p, contacts == "stuck")
@@ -317,7 +326,7 @@ def holding_points(model: Model, contacts: ContactsAs) -> BoolArray:
 
 
 def _pressed(model: Model) -> BoolArray:
-    """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
+    """Return whether contact points are pressed by the static loads at the model's own speed, or cannot open."""
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
     refuse_pulled(model, static_forces(model, forces))
@@ -332,7 +341,10 @@ def _pressed(model: Model) -> BoolArray:
 
 
 def frequencies(model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store) -> Frequencies:
-    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; on a wheel for the first driven harmonic."""
+    """Compare natural frequencies of the full and the reduced model, with open and with stuck contacts.
+
+    On a wheel this is done for the first driven harmonic.
+    """
     number = 0 if order is None else excited_wave(order, model.sectors, _first(model))
     reduced, gaps, place = linear.of_wave(number)
     bodies = _free_dofs(model)
@@ -362,7 +374,7 @@ def _without(structure: Structure, dofs: IntArray) -> Structure:
 
 
 def _lowest(model: Model, structure: Structure, count: int, store: Store) -> FloatArray:
-    """Return natural frequencies of the full model, remembered by its content."""
+    """Return natural frequencies of the full model; they are cached by its content."""
     content = content_hash("frequencies", structure.mass, structure.stiffness, count)
     memo = next(iter(model.parts.values())).memo
     if content not in memo:
@@ -378,7 +390,7 @@ def contact_table(pairs: Pairs) -> ContactTable:
 
 @dataclass(frozen=True, eq=False)
 class OnShapes:
-    """Joined structure whose joined surfaces may move in a few shapes.
+    """Joined structure whose joined surfaces may be reduced to a few shapes.
 
     Parameters
     ----------
@@ -387,7 +399,7 @@ class OnShapes:
     way
         (n0, n) CSR from the new to the previous coordinates; None: they are the same.
     place
-        (n0,) new position of each previous coordinate; -1 where shapes replace it.
+        (n0,) new position of each previous coordinate; -1 if shapes replace it.
     """
 
     structure: Structure

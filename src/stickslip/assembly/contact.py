@@ -9,9 +9,9 @@ from stickslip.errors import input_error
 GROUND = "ground"
 NEXT = "next."  # prefix of a surface of the neighbouring sector, in the sense of rotation
 PairingKind = Literal["node_to_node", "node_to_segment", "segment_to_segment"]
-SPATIAL: Literal["spatial_harmonics"] = "spatial_harmonics"  # wheels of different numbers of sectors
+SPATIAL: Literal["spatial_harmonics"] = "spatial_harmonics"  # join of wheels with different numbers of sectors
 Share = Literal["interface", "point", "area"]
-# of stages that such a join couples
+# remedy in messages about stages that such a join couples
 ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."
 
 
@@ -22,24 +22,27 @@ class Contact:
     Parameters
     ----------
     between
-        The first surface gives the points and the normal, ``part.surface``; the second is ``part.surface``, ``next.part.surface``
-        (of the neighbouring sector) or ``ground``. The gap is ``frameᵀ (u_second - u_first)``, with n out of the first body.
+        The first surface gives the points and the normal, ``part.surface``; the second is ``part.surface``,
+        ``next.part.surface`` (of the neighbouring sector) or ``ground``. The gap is ``frameᵀ (u_second - u_first)``,
+        with n out of the first body.
     law
         Contact law. Its stiffnesses and forces refer to the unit of `share`.
     share
-        Unit of the parameters of the law. ``interface``: the whole interface, shared among its points; ``point``: each point;
-        ``area``: one square metre.
+        Unit of the parameters of the law. ``interface``: the whole interface, shared among its points; ``point``: each
+        point; ``area``: one square metre.
     pairing
         Method that finds the partner of each point.
     tangent
-        Direction whose projection on the contact plane is t; None: t of the surface's own frames, or any direction where the law is
-        the same along t and w.
+        Direction whose projection on the contact plane is t; None: t of the surface's own frames, or any direction if
+        the law is the same along t and w.
     normal
-        Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: the normal of the surfaces.
+        Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: the normal of
+        the surfaces.
     acts
         Contact direction (t, w or n) of the relative motion of single dofs, which have no normal.
     tolerance
-        Largest distance of partners, m: between nodes, or from a point to its segment; None: the default of the pairing.
+        Largest distance of partners, m: between nodes, or from a point to its segment; None: the default of the
+        pairing.
     gap
         Clearance at rest, m. A negative value is an interference, the overlap of the undeformed bodies.
     preload

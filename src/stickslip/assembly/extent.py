@@ -38,7 +38,7 @@ def extent_of(model: Model, harmonics: int) -> Extent:
 
 
 def _stiff_volume(part: Part) -> float:
-    """Return the largest Young's modulus times the volume that the least density gives, J."""
+    """Return the largest Young's modulus times the volume that follows from the smallest density, J."""
     solid = part.solid if part.template is None else part.template.solid
     if solid is None:
         return float("nan")

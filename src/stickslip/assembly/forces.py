@@ -1,4 +1,4 @@
-"""Loads and outputs of a model, and loads as forces on the dofs of all parts."""
+"""Loads and outputs of a model, and forces of the loads on the dofs of all parts."""
 
 import cmath
 import math
@@ -13,10 +13,10 @@ from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.assembly.locations import AXES, COMPONENTS, Places, Spot
 from stickslip.errors import did_you_mean, input_error
 
-# what says that the error of missing harmonics is that of the answer: all outputs, each as a vector
+# request for the error of all outputs, each as a vector: the error of the answer
 ANSWER: tuple[tuple[str, ...], ...] = ((), ("answer",))
-FAR = 0.1  # of a part's size: no mesh is so coarse
-ALONG = 1e-6  # share of a direction below which it has no such component
+FAR = 0.1  # distance of an output from its node, as a share of the part's size, above which a warning is given
+ALONG = 1e-6  # share of a direction below which a component counts as zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,27 +26,31 @@ class Load:
     Parameters
     ----------
     on
-        ``part`` (a rigid body, at its centre of mass), ``part.set`` (shared equally among its nodes), or a dof ``part.node12.x``.
+        ``part`` (a rigid body, at its centre of mass), ``part.set`` (shared equally among its nodes), or a dof
+        ``part.node12.x``.
     newton
         Resultant force, or its amplitude, N.
     direction
-        Unit vector in global axes (of the sector, on a wheel); None where `on` is a single dof.
+        Unit vector in global axes (of the sector, on a wheel); None if `on` is a single dof.
     harmonic
         0: static; h: ``Re(newton e^{i(h ω t + phase)})``.
     phase
         In rad.
     engine_order
-        Engine order m on a wheel: harmonic h travels as the wave ``h m``; 0: all sectors alike; None for a single structure.
+        Engine order m on a wheel: harmonic h travels as the wave ``h m``; 0: all sectors alike; None for a single
+        structure.
     omega, omega_ratio
-        Frequency of a load with its own frequency, rad/s, or its ratio to the frequency of the other loads; the motion then has two
-        frequencies. None: the frequency of the other loads.
+        Frequency of a load with its own frequency, rad/s, or its ratio to the frequency of the other loads; the motion
+        then has two frequencies. None: the frequency of the other loads.
     field
-        Pressure on the facets of a surface instead of a force. `newton` is then a factor, 1 for the whole field. None: a force.
+        Pressure on the facets of a surface instead of a force; `newton` is then a factor, 1 for the whole field. None:
+        a force.
 
     Raises
     ------
     InputError
-        If the harmonic or the engine order is no count, a number is not finite, or a static load has a phase or an own frequency.
+        If the harmonic or the engine order is not a count, a number is not finite, or a static load has a phase or its
+        own frequency.
     """
 
     on: str
@@ -95,7 +99,7 @@ class Output:
     on
         ``part.set`` (its first node), a dof ``part.node12.x``, or a part together with `near`.
     near
-        (3,) place in m; the nearest node of the part `on` is taken.
+        (3,) position in m; the nearest node of the part `on` is taken.
     directions
         Reported components, from x, y, z, rx, ry, rz; empty: all components of the point.
     """
@@ -107,7 +111,7 @@ class Output:
 
 
 def force_of(places: Places, name: str, load: Load) -> Matrix:
-    """Return the (N,) force of a load, complex where it has a phase; see `force_at`."""
+    """Return the (N,) force of a load, complex if it has a phase; see `force_at`."""
     return force_at(places, f"load.{name}", load)
 
 
@@ -120,12 +124,12 @@ def amplitude(places: Places, name: str, load: Load) -> float:
 
 
 def force_at(places: Places, key: str, load: Load) -> Matrix:
-    """Return the (N,) force of a load that a study gives at `key`.
+    """Return the (N,) force of the load at a study `key`.
 
     Raises
     ------
     InputError
-        If the place is not there or cannot move, or the direction is missing.
+        If the place does not exist or cannot move, or the direction is missing.
     """
     amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
     if load.field is not None:
@@ -158,7 +162,7 @@ def _moves(spot: Spot, axis: int) -> bool:
 
 
 def _refuse_direction(places: Places, key: str, load: Load, spot: Spot) -> None:
-    """Refuse a direction that is not the one in which single dofs move, along which the whole force acts."""
+    """Refuse a load on single dofs with another direction than theirs, along which the whole force acts."""
     if load.direction is None:
         return
     own = {places.dofs.component[dof] for dof in spot.dofs}
@@ -198,8 +202,9 @@ class Driving(Protocol):
 def engine_order(loads: Mapping[str, Driving], wheel: bool) -> tuple[int | None, dict[str, int]]:
     """Return the base engine order of the loads, and the harmonic of each load.
 
-    Loads with one engine order have it as their base. With several, the base is the greatest common divisor m_0 of the orders
-    ``harmonic · engine_order``: a load of order m acts in harmonic m/m_0 of the frequency m_0 Ω, and travels as the wave m.
+    If all loads have the same engine order, it is the base. Otherwise the base is the greatest common divisor m_0 of
+    the orders ``harmonic · engine_order``: a load of order m acts in harmonic m/m_0 of the frequency m_0 Ω, and travels
+    as the wave m.
 
     Returns
     -------
@@ -211,7 +216,8 @@ def engine_order(loads: Mapping[str, Driving], wheel: bool) -> tuple[int | None,
     Raises
     ------
     InputError
-        If a load on a sector has no engine order, or one elsewhere has one; if some loads have order 0 and others not.
+        If a load on a sector has no engine order, or a load on a single structure has one; if only some loads have
+        order 0.
     """
     found: dict[str, int] = {}
     for name, load in loads.items():
@@ -314,7 +320,7 @@ def _of_output(places: Places, output: Output) -> list[tuple[str, int]]:
 
 
 def _first(places: Places, spot: Spot) -> IntArray:
-    """Return the dofs of a spot's first node, or of the body that a rigid point belongs to."""
+    """Return the dofs of a spot's first node, or of its rigid body."""
     part = places.parts[spot.part]
     if part.body is not None:
         return places.own(spot.part)
@@ -324,7 +330,7 @@ def _first(places: Places, spot: Spot) -> IntArray:
 
 
 def first_nodes(places: Places, outputs: tuple[Output, ...]) -> tuple[str, ...]:
-    """Return a line about each output on a set of several nodes, which reports the first node."""
+    """Return a line about each output on a set of several nodes, of which only the first is reported."""
     found = []
     for output in outputs:
         if output.near is None and places.parts[output.on.partition(".")[0]].body is None:
@@ -398,7 +404,7 @@ def _axis_of_excitation(loads: Mapping[str, Load]) -> str | None:
 
 
 def beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
-    """Return a warning about engine orders not below the number of sectors: they act as lower ones do."""
+    """Return a warning about engine orders that are not below the number of sectors, and act like lower ones."""
     return [
         f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}; such a force varies within a sector, but is taken as constant over its place."
         for name, load in loads.items()

@@ -19,12 +19,12 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.reduction.waves import wave
 from stickslip.response.system import System
 
-COLUMNS = 64  # of a way that are found together
+COLUMNS = 64  # number of columns of a recovery matrix that are computed together
 Felt = Callable[[DynamicStiffness], DynamicStiffness]
 
 
 def as_it_is(side: DynamicStiffness) -> DynamicStiffness:
-    """Return the dynamic stiffness unchanged, as a steady motion has it."""
+    """Return the dynamic stiffness unchanged, for a steady motion."""
     return side
 
 
@@ -41,11 +41,11 @@ class Nodes:
     points
         (n, 3) positions, m.
     cells
-        (m, k) nodes of each cell in VTK order; None where the part has no mesh.
+        (m, k) nodes of each cell in VTK order; None if the part has no mesh.
     cell_numbers
         (m,) numbers of the cells; None without a mesh.
     dofs
-        (n, 3) dofs x, y, z of all parts; -1 where a node is clamped.
+        (n, 3) dofs x, y, z of all parts; -1 if a node is clamped.
     """
 
     part: str
@@ -67,7 +67,7 @@ def nodes_of(model: Model) -> tuple[Nodes, ...]:
     Raises
     ------
     InputError
-        If no part has any.
+        If no part has such nodes.
     """
     found = [own for name in model.parts if (own := _nodes(model, name)) is not None]
     if not found:
@@ -95,7 +95,7 @@ def _nodes(model: Model, name: str) -> Nodes | None:
 
 @dataclass(frozen=True, eq=False)
 class Everywhere:
-    """Recovery of all dofs of all parts from the coordinates that a motion is solved for.
+    """Recovery of all dofs of all parts from the retained coordinates of a motion.
 
     Parameters
     ----------
@@ -119,18 +119,18 @@ class Everywhere:
     _expand: Callable[[Matrix, int], Matrix]
 
     def fields(self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is) -> ComplexArray:
-        """Return the (s, H+1, N) motion of all dofs of each sector in its own axes, or of one sector where all are alike.
+        """Return the (s, H+1, N) motion of all dofs of each sector in its own axes, or of one sector if all are alike.
 
         Parameters
         ----------
         omega
             In rad/s.
         retained
-            (H+1, n) motion of the retained coordinates of the system and of `more`, in rising order, m.
+            (H+1, n) motion of the retained coordinates of the system and of `more`, in ascending order, m.
         more
             Further coordinates with known motion.
         felt
-            Map from the dynamic stiffness of a steady motion to that of this motion.
+            Function from the dynamic stiffness of a steady motion to the dynamic stiffness of this motion.
         """
         condensed = felt(self.system.condensed(self.load, len(retained) - 1, more))
         every = condensed.recover(omega, retained)
@@ -138,9 +138,10 @@ class Everywhere:
         return np.stack(each, axis=1)
 
     def way(self, rows: Matrix, harmonic: int) -> Matrix:
-        """Return the (r, n) matrix from the coordinates to operators `rows` (r, N) on all dofs of a sector, in single precision.
+        """Return the (r, n) matrix from the coordinates to operators `rows` (r, N) on all dofs of a sector.
 
-        It takes some columns at a time: one after the other would take as long as the reduction, all at once the memory of the mesh.
+        It is in single precision. Some columns are computed at a time: single columns would take as long as the
+        reduction, all columns as much memory as the mesh.
         """
         n = self.system.structure.n
         each = (np.eye(n)[:, k : k + COLUMNS] for k in range(0, n, COLUMNS))
@@ -148,7 +149,10 @@ class Everywhere:
         return found.astype(np.complex64 if np.iscomplexobj(found) else np.float32)
 
     def phase(self, harmonic: int, sector: int) -> complex:
-        """Return the phase factor of a harmonic between a sector and sector 0, each in its own axes, where all sectors are alike."""
+        """Return the phase factor of a harmonic between a sector and sector 0, if all sectors are alike.
+
+        Each sector has its own axes.
+        """
         return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
 
 

@@ -1,4 +1,4 @@
-"""Names of surfaces, node sets, nodes and dofs, resolved on the dofs of all parts; surfaces with their clamped rim."""
+"""Dofs and surfaces by name of a surface, node set, node or dof; surfaces with their clamped rim."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """Surface or dofs behind a name of a model.
+    """Surface or dofs with a name in a model.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ class Spot:
     dofs
         (k,) single dofs; empty for points.
     frame
-        (p, 3, 3) columns t, w, n of the frames of the points; None where normals follow from facets.
+        (p, 3, 3) columns t, w, n of the frames of the points; None if normals follow from facets.
     labels
         Names of the points; empty without names.
     nodes
-        (p, 3) dofs of points that are nodes, -1 where they are clamped; None for points of rigid bodies.
+        (p, 3) dofs of points that are nodes, -1 if they are clamped; None for points of rigid bodies.
     area
-        (p,) areas of the points of a rigid body, m²; None where the points have no own areas.
+        (p,) areas of the points of a rigid body, m²; None if the points have no own areas.
     """
 
     name: str
@@ -188,7 +188,7 @@ class Places:
         return Spot(name, head, None, self.offset(head) + hits) if hits.size == 1 else None
 
     def _nodal(self, name: str, head: str, numbers: IntArray, points: FloatArray, facets: IntArray) -> Spot:
-        """Return nodes of a part with their dofs x, y, z; missing dofs are held."""
+        """Return nodes of a part with their dofs x, y, z; missing dofs count as held."""
         table = self.parts[head].structure.dofs
         rows = node_rows(table, numbers)[:, :3]
         dofs = np.where(rows >= 0, rows + self.offset(head), -1)
@@ -203,7 +203,7 @@ class Places:
 
 
 def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
-    """Return the complaint about a name that a part does not have."""
+    """Return the error about a name that a part does not have."""
     if name.partition(".")[2].upper() in map(str.upper, part.clamped_sets):
         return input_error(
             place, f"every node of {name!r} is clamped", "Name a set whose nodes can move, or clamp less."
@@ -248,11 +248,13 @@ def picked(index: IntArray, n: int) -> Matrix:
 
 
 def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
-    """Return the facets that continue a surface smoothly onto clamped nodes, and these nodes, as indices of mesh points.
+    """Return the facets that continue a surface smoothly onto clamped nodes, and these nodes.
+
+    Nodes are indices of mesh points.
 
     Returns
     -------
-    facets : (m, k) nodes of each facet; empty where the surface has no facets, or contains clamped nodes itself
+    facets : (m, k) nodes of each facet; empty if the surface has no facets, or contains clamped nodes itself
     nodes : clamped nodes of these facets
     """
     from scipy.spatial import cKDTree
@@ -298,7 +300,7 @@ def with_rim(places: Places, spot: Spot) -> Surface:
 
 
 def _middles(points: FloatArray, facets: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the middles of facets and their unit normals."""
+    """Return the centres of facets and their unit normals."""
     normal = normals(points, facets, centres(facets))
     middle = points[facets].mean(axis=1)
     return middle, normal / np.linalg.norm(normal, axis=1, keepdims=True)

@@ -70,12 +70,14 @@ class Model:
     parts, contacts, joins, loads
         Parts, contacts, joins and loads by name.
     outputs
-        Reported points; none: the points under harmonic loads. The peak is that of the first label unless `peak_output` names another.
+        Reported points; none: the points under harmonic loads. The peak is taken of the first label unless
+        `peak_output` names another.
     peak_output, amplitude_of
-        Label of the output whose peak is resolved (empty: the first one), and the definition of its amplitude: ``first``,
-        ``half_peak_to_peak`` or ``rms``.
+        Label of the output whose peak is resolved (empty: the first one), and the definition of its amplitude:
+        ``first``, ``half_peak_to_peak`` or ``rms``.
     alert_over
-        Labels over which the truncation error is taken, or ``answer``, ``outputs``, ``contacts``, ``along``; empty: ``answer``.
+        Labels over which the truncation error is taken, or ``answer``, ``outputs``, ``contacts``, ``along``; empty:
+        ``answer``.
     speed
         Rotor speed, rad/s.
     tangent, coriolis
@@ -83,15 +85,16 @@ class Model:
     centrifugal
         Whether the centrifugal load of rotating parts is a static load of the response.
     interface_modes
-        Number of characteristic shapes that replace the nodes of joined surfaces of a single structure in the forced response;
-        None: the nodes are kept.
+        Number of characteristic shapes that replace the nodes of joined surfaces of a single structure in the forced
+        response; None: the nodes are kept.
     retention
         Stiffness of springs that keep the mean position of free rigid bodies, N/m.
     mistuning
         Differences between the sectors of a wheel; None: all are alike.
     modes_like
-        Reference speeds of the reduction, rad/s. One: modal coordinates are rotated to the modes at this speed, so that reduced
-        matrices change smoothly with the speed. Several: the span of the modes at all of them is kept. Empty: the modes at `speed`.
+        Reference speeds of the reduction, rad/s. One: modal coordinates are rotated to the modes at this speed, so that
+        reduced matrices change smoothly with the speed. Several: the span of the modes at all of them is kept. Empty:
+        the modes at `speed`.
     aerodynamics
         Aerodynamic coupling of the blades of a wheel; None without a fluid. `at` neglects it.
 
@@ -149,7 +152,7 @@ class Model:
         return f"<Model: {'; '.join(words)}>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave what can be computed again behind."""
+        """Pickle only the fields; everything else can be computed again."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
@@ -168,14 +171,14 @@ class Model:
 
     @property
     def axis(self) -> Axis:
-        """Axis of rotation: that of the first part that turns."""
+        """Axis of rotation of the first part that rotates."""
         every = list(self.parts.values())
         turning = [part for part in every if part.solid is not None or part.sectors > 1]
         return (turning or every)[0].axis
 
     @cached_property
     def places(self) -> Places:
-        """Surfaces and dofs behind the names of the model."""
+        """Dofs and surfaces by their names in the model."""
         return Places(self.parts)
 
     @cached_property
@@ -212,7 +215,10 @@ class Model:
 
     @property
     def engine_order(self) -> int | None:
-        """Engine order of the frequency: that of the loads, or the greatest common divisor of several; None for a single structure."""
+        """Engine order of the frequency: order of the loads, or greatest common divisor of several.
+
+        None for a single structure.
+        """
         return self._orders[0]
 
     @property
@@ -227,12 +233,15 @@ class Model:
 
     @property
     def spread(self) -> tuple[str, ...]:
-        """Names of the loads whose nodes do not stay in the reduction: pressure fields on a wheel, which are projected on its modes."""
+        """Names of the loads whose nodes the reduction does not keep.
+
+        These are pressure fields on a wheel, which are projected on its modes.
+        """
         fields = [name for name, load in self.loads.items() if load.field is not None]
         return tuple(fields) if self.sectors > 1 else ()
 
     def without_aerodynamics(self) -> "Model":
-        """Return the model in still fluid, itself where it has no coefficients."""
+        """Return the model without aerodynamic forces; itself if it has none."""
         return self if self.aerodynamics is None else replace(self, aerodynamics=None)
 
     @property
@@ -287,7 +296,7 @@ class Model:
         *,
         with_damping: bool = False,
     ) -> Structure:
-        """Return the full structure for small vibrations at a speed, as the travelling wave of a wave number where it is a sector.
+        """Return the full structure for small vibrations at a speed; for a sector, one travelling wave.
 
         Parameters
         ----------
@@ -296,8 +305,8 @@ class Model:
         wave_number
             Wave number modulo the number of sectors; unused for a single structure.
         contacts
-            State of the contacts. ``open``: no forces; ``stuck``: all are springs; an array (p,): these points are springs, as
-            `holding_points` finds them in the static state. Rigid bodies without any support are then left out.
+            State of the contacts. ``open``: no forces; ``stuck``: all are springs; an array (p,): these points are
+            springs, as from `holding_points` for the static state. Rigid bodies without any support are then left out.
         with_damping
             Whether to include damping from the matrices of the parts; modal damping ratios are never included.
 
@@ -333,11 +342,14 @@ class Model:
 
     @cached_property
     def skin(self) -> Skin | None:
-        """Outer surface of the meshes; None where no part has a mesh."""
+        """Outer surface of the meshes; None if no part has a mesh."""
         return skin_of(self.parts)
 
     def on_skin(self, field: Matrix) -> Matrix:
-        """Return displacements (m, n, 3) of the skin's points from fields (N, m) on the dofs of all parts, as `at(...).expand` makes them."""
+        """Return displacements (m, n, 3) of the skin's points from fields (N, m) on the dofs of all parts.
+
+        `at(...).expand` returns such fields.
+        """
         return on_skin(self.places, field)
 
     def static_displacement(self, speed: float) -> dict[str, FloatArray]:

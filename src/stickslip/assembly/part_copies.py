@@ -1,4 +1,4 @@
-"""Copies of parts: mirrored, turned, moved."""
+"""Mirrored, rotated and moved copies of parts."""
 
 from dataclasses import replace
 from typing import Any
@@ -23,7 +23,7 @@ def place_of(
     axis: Axis = Axis(),  # noqa: B008  # frozen
     move: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Place:
-    """Return a place: mirrored in the plane through the origin with the normal `mirror`, then turned, then moved.
+    """Return a placement: mirrored in the plane through the origin with the normal `mirror`, then rotated, then moved.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
     part
         Part to copy; a copy of a copy refers to the original.
     place
-        Position of the copy relative to `part`.
+        Placement of the copy relative to `part`.
     **others
         Further fields of `Part` that differ.
 
     Raises
     ------
     InputError
-        If a node lacks a component that the turn mixes with another one.
+        If a node lacks a component that the rotation mixes with another one.
     """
     template = part if part.template is None else part.template
     whole = place
@@ -95,7 +95,7 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
 
 
 def placed_body(part: Part, place: Place) -> Part:
-    """Return a rigid part with its body axes moved to `place`: an independent part, no copy."""
+    """Return a rigid part with its body axes moved to `place`, as an independent part."""
     assert part.body is not None
     surfaces = {name: _moved_points(points, place) for name, points in part.surfaces.items()}
     drawn = None if part.drawn is None else part.drawn.moved(place.turn, place.move)
@@ -103,13 +103,16 @@ def placed_body(part: Part, place: Place) -> Part:
 
 
 def moved_mesh(mesh: SolidMesh, place: Place) -> SolidMesh:
-    """Return a mesh in another place; numbers and sets stay."""
+    """Return a mesh in another place; numbers and sets are unchanged."""
     cells = mirrored_cells(mesh.cells) if place.mirrors else mesh.cells
     return replace(mesh, points=place.put(mesh.points), cells=cells)
 
 
 def turned_dofs(dofs: Dofs, place: Place) -> Matrix:
-    """Return the CSR matrix from displacements of the original to those of the copy; modal and other scalars stay."""
+    """Return the CSR matrix from displacements of the original to those of the copy.
+
+    Modal and other scalars are unchanged.
+    """
     matrix = dof_rotation(dofs, place.turn, "copy_of")
     if place.mirrors:  # rotations are axial vectors
         sign = [-1.0 if c in ("rx", "ry", "rz") else 1.0 for c in dofs.component]
@@ -118,7 +121,7 @@ def turned_dofs(dofs: Dofs, place: Place) -> Matrix:
 
 
 def turned_structure(structure: Structure, place: Place) -> Structure:
-    """Return a structure in another place: its matrices on the coordinates x, y, z there."""
+    """Return a structure in another place, with its matrices on the coordinates x, y, z there."""
     turn = turned_dofs(structure.dofs, place)
 
     def turned(matrix: Matrix) -> Matrix:
@@ -135,7 +138,7 @@ def turned_structure(structure: Structure, place: Place) -> Structure:
 
 def _moved_points(points: BodyPoints, place: Place) -> BodyPoints:
     frame = place.turn @ points.frame
-    if place.mirrors:  # frames stay right-handed: w turns round
+    if place.mirrors:  # frames stay right-handed: w is reversed
         frame = frame * np.array([1.0, -1.0, 1.0])
     return replace(points, position=place.put(points.position), frame=frame)
 

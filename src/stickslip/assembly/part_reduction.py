@@ -1,4 +1,4 @@
-"""Reduction of the parts, each once: copies and later models share it."""
+"""Reduction of the parts, each once; copies and later models share the result."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -22,9 +22,9 @@ from stickslip.reduction.choice import Reduction
 from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
-REMEMBERED = 4  # reductions of a part that are kept in memory
+REMEMBERED = 4  # reductions of a part that are cached
 LAST = "last, with its way back"
-MOST_BASIS_BYTES = 100_000_000  # of that way back to all dofs
+MOST_BASIS_BYTES = 100_000_000  # of that map to all dofs
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Spin:
 
     @property
     def references(self) -> tuple["Spin", ...]:
-        """Rotations at the reference speeds `like`; empty: the modes are those of this rotation."""
+        """Rotations at the reference speeds `like`; empty: the modes of this rotation are used."""
         if self.like in ((), (self.speed,)):
             return ()
         return tuple(replace(self, speed=speed, like=()) for speed in self.like)
@@ -66,9 +66,11 @@ class Steady:
     tie
         Tie of the cyclic faces; None without such faces.
     unit
-        (n,) displacement over the square of the speed, m s², solved together with the joined parts; None: that of the part alone.
+        (n,) displacement over the square of the speed, m s², solved together with the joined parts; None: displacement
+        of the part alone.
     carried
-        (n,) force over the square of the speed, N s², that contacts carry where they alone hold the part; None for a supported part.
+        (n,) force over the square of the speed, N s², that contacts carry if they alone support the part; None for a
+        supported part.
     """
 
     tie: Matrix | None = None
@@ -87,7 +89,10 @@ ALONE = Steady()
 
 
 def steady_of(part: Part, tie: Matrix | None) -> Steady:
-    """Return the conditions of steady rotation of a part alone; a free part is in balance with its inertia forces."""
+    """Return the conditions of steady rotation of a part alone.
+
+    A free part is in equilibrium with its inertia forces.
+    """
     relief = None if part.solid is None else inertia_relief(part.solid, tie)
     return Steady(tie) if relief is None else Steady(tie, *relief)
 
@@ -112,12 +117,15 @@ class ReducedPart:
 
 
 def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Compute the arrays without keeping them: the store of a model outside a study."""
+    """Compute the arrays without caching them: the store of a model outside a study."""
     return make()
 
 
 def with_ways_back(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Compute the arrays without keeping them. Reductions with this store also return their `basis`, the map to all dofs."""
+    """Compute the arrays without caching them.
+
+    Reductions with this store also return their `basis`, the map to all dofs.
+    """
     return make()
 
 
@@ -154,18 +162,18 @@ def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALO
 
 
 def damped(name: str, part: Part, structure: Structure) -> Structure:
-    """Return a structure of a part with the damping from the part's matrices."""
+    """Return the structure of a part with the damping from the part's matrices."""
     if part.damping is None:
         return structure
     try:
-        # neither tension nor spin softening dissipates
+        # stress stiffening and spin softening do not dissipate
         return part.damping.of_matrices(structure, part.structure.stiffness)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
 
 
 def whole_nodes(table: Dofs, dofs: IntArray) -> IntArray:
-    """Return all dofs of the nodes that have a dof among `dofs`, in rising order."""
+    """Return all dofs of the nodes that have a dof among `dofs`, in ascending order."""
     numbers = np.unique(table.node[dofs])
     rows = node_rows(table, numbers[numbers >= 0])
     return np.union1d(dofs, rows[rows >= 0])
@@ -239,7 +247,7 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
             with step(f"reducing part {name}: {n} dofs to {kept.size} of contacts, loads and outputs, and modes", n):
                 made = _reduce(name, part, kept, spin, rest)
             if not whole and _small(made.structure.basis):
-                part.memo[LAST] = (*key[:-1], True), made  # the motion of pictures needs it next
+                part.memo[LAST] = (*key[:-1], True), made  # pictures of the motion need it next
             return made if whole else replace(made, structure=replace(made.structure, basis=None))
 
         if part.reduction is None or part.body is not None or whole:
@@ -256,7 +264,7 @@ def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady]
 
 
 def _small(basis: Matrix | None) -> bool:
-    """Return whether a way back to all dofs is small enough to stay in memory."""
+    """Return whether a map to all dofs is small enough to stay in memory."""
     return isinstance(basis, np.ndarray) and basis.nbytes <= MOST_BASIS_BYTES
 
 
@@ -265,7 +273,7 @@ def _packed(made: ReducedPart) -> dict[str, Any]:
 
 
 def forget(memo: dict[Any, Any], kind: type, most: int) -> None:
-    """Drop all but the last `most` values of a kind from memory."""
+    """Remove all but the last `most` values of a kind from memory."""
     for key in [key for key, value in memo.items() if isinstance(value, kind)][:-most]:
         del memo[key]
 
@@ -294,7 +302,7 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
 
 
 def _placed(made: ReducedPart, part: Part) -> ReducedPart:
-    """Return the reduction of a part for a copy of it: physical coordinates turn, modal ones stay."""
+    """Return the reduction of a part for its copy: physical coordinates rotate, modal ones are unchanged."""
     assert part.place is not None
     structure = turned_structure(made.structure, part.place)
     turn = turned_dofs(made.structure.dofs, part.place)

@@ -1,4 +1,4 @@
-"""The request of a response to a model: forces, outputs, and refusals."""
+"""Forces and outputs of a response, and refusals of inconsistent requests."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from stickslip.errors import input_error
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Loads and places of a response, on the dofs of all parts.
+    """Loads and outputs of a response, on the dofs of all parts.
 
     Parameters
     ----------

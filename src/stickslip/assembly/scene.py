@@ -1,4 +1,4 @@
-"""The model as pictures show it: bodies, loads and supports, and the motion of all that is drawn."""
+"""Picture of a model: bodies, loads and supports, and the motion of its points."""
 
 from dataclasses import dataclass, field, replace
 
@@ -19,14 +19,14 @@ from stickslip.model.part import Part
 from stickslip.model.rigid.solids import prism
 from stickslip.response.system import System
 
-MOST_POINTS = 2_000  # of the skins of all meshes together
-MOST_DOFS = 60_000  # of models whose motion is recovered, which takes a second reduction
+MOST_POINTS = 2_000  # of all meshes together
+MOST_DOFS = 60_000  # of models whose motion is recovered, which needs a second reduction
 MOST_COORDINATES = 3_000  # of a model that is not reduced
 MOST_HARMONICS = {
     False: 7,
     True: 3,
-}  # of motions of a structure, and of a wheel, each harmonic of which is another wave
-SUPPORTED = 1e-9  # of the largest stiffness: net stiffness of a lumped mass that something holds
+}  # of motions of a structure, and of a wheel, whose harmonics are different waves
+SUPPORTED = 1e-9  # share of the largest stiffness above which a lumped mass counts as supported
 _MASS = 0.35  # side of a lumped mass over the distance to the next one
 _NODE = 0.012  # side of a node without a mesh over the size of its part
 _CUBE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -34,22 +34,23 @@ _CUBE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a picture of a model shows, in m along the global axes; lumped masses without positions stand in a row, 1 m apart.
+    """Picture of a model, in m along the global axes; lumped masses without positions are drawn in a row, 1 m apart.
 
     Parameters
     ----------
     points, triangles
         (n, 3) points and (k, 3) triangles of the drawn surfaces.
     part, kind
-        (n,) name of the part of each point, and what it is drawn from: ``mesh``, ``section``, ``contact faces``, ``node`` or ``mass``.
+        (n,) name of the part of each point, and the source of its drawing: ``mesh``, ``section``, ``contact faces``,
+        ``node`` or ``mass``.
     contacts
         (p, 3) positions of the contact points.
     load, load_harmonic
         (l,) name of each load, and its harmonic, 0 for a static one.
     load_points, load_directions
-        (l, 3) where it acts, and its direction.
+        (l, 3) point at which each load acts, and its direction.
     supports
-        (s, 3) points that are held.
+        (s, 3) supported points.
     moving
         Recovery of the motion; None for models that are too large.
     """
@@ -76,8 +77,8 @@ class Moving:
     system, load
         The model reduced again, in the coordinates of the ways.
     ways
-        (3 (n + p), m) matrices from its coordinates to the displacements of the points and contact points, in the harmonics from 1 on;
-        a single one stands for all harmonics.
+        (3 (n + p), m) matrices from its coordinates to the displacements of the points and contact points, in the
+        harmonics from 1 on; a single one applies to all harmonics.
     harmonics
         Highest harmonic of the motion.
     points
@@ -112,7 +113,11 @@ class Moving:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Surface of a part: points, triangles, origin, the (3 n, N) operator of their displacements, and the held places (s, 3)."""
+    """Surface of a part.
+
+    It has points, triangles, origin of the drawing, the (3 n, N) operator of the displacements, and the supported
+    points (s, 3).
+    """
 
     points: FloatArray
     triangles: IntArray
@@ -122,7 +127,7 @@ class _Drawn:
 
 
 def scene_of(model: Model, harmonics: int) -> Scene:
-    """Return what pictures of a model show; `harmonics` is the highest harmonic of the response."""
+    """Return the picture of a model; `harmonics` is the highest harmonic of the response."""
     places = model.places
     row = _row(places)
     drawn = {name: own for name, part in model.parts.items() if (own := _drawn(model, name, part, row)) is not None}
@@ -150,7 +155,7 @@ def scene_of(model: Model, harmonics: int) -> Scene:
 
 
 def _moving(model: Model, harmonics: int, rows: Matrix, points: int) -> Moving | None:
-    """Reduce a model again, and return the recovery of the motion of its picture; None where that is not done."""
+    """Reduce a model again, and return the recovery of the motion in its picture; None if the motion is not drawn."""
     if model.places.n > MOST_DOFS or not rows.shape[0]:
         return None
     wheel = model.sectors > 1
@@ -167,7 +172,7 @@ def _moving(model: Model, harmonics: int, rows: Matrix, points: int) -> Moving |
 
 
 def _row(places: Places) -> dict[int, FloatArray]:
-    """Return the places in pictures of dofs of all parts that have no position in space: one behind the other along x."""
+    """Return the drawn positions of dofs of all parts without a position in space: one behind the other along x."""
     free = [
         int(dof)
         for name, part in places.parts.items()
@@ -178,14 +183,14 @@ def _row(places: Places) -> dict[int, FloatArray]:
 
 
 def _placed(part: Part) -> bool:
-    """Whether the nodes of a part have places of their own."""
+    """Whether the nodes of a part have positions."""
     position = part.structure.dofs.position
     known = position[np.isfinite(position).all(axis=1)]
     return bool(known.size) and bool(np.ptp(known, axis=0).max() > 0)
 
 
 def _drawn(model: Model, name: str, part: Part, row: dict[int, FloatArray]) -> _Drawn | None:
-    """Return the surface of a part; None where it has no place and no shape."""
+    """Return the surface of a part; None if it has neither position nor shape."""
     if part.mesh is not None:
         return _of_mesh(model, name, part)
     if part.body is not None:
@@ -203,7 +208,7 @@ def _of_mesh(model: Model, name: str, part: Part) -> _Drawn:
     dofs = np.full((len(mesh.points), 3), -1)
     dofs[nodes, components] = own + model.places.offset(name)
     rows = picked(dofs[kept].ravel(), model.places.n)
-    # nodes of a deck's matrices may be condensed, those of a solid have all their dofs unless they are clamped
+    # nodes of a deck's matrices may be condensed; nodes of a solid have all their dofs unless they are clamped
     held = (dofs[kept] < 0).all(axis=1) & (part.solid is not None)
     return _Drawn(mesh.points[kept], triangles, "mesh", rows, mesh.points[kept][held])
 
@@ -258,7 +263,7 @@ def _cubes(model: Model, centres: FloatArray, side: float, dofs: IntArray, kind:
 
 
 def _contacts(model: Model, row: dict[int, FloatArray]) -> tuple[FloatArray, Matrix]:
-    """Return the places of the contact points, and the (3 p, N) operator to the displacements of the first of the two surfaces."""
+    """Return the positions of the contact points, and the (3 p, N) operator to displacements of the first surfaces."""
     places, pairs = model.places, model.pairs
     position = pairs.position.copy()
     blocks = []
@@ -283,7 +288,10 @@ def _contacts(model: Model, row: dict[int, FloatArray]) -> tuple[FloatArray, Mat
 
 
 def _beside(places: Places, row: dict[int, FloatArray], dof: int, other: str) -> FloatArray:
-    """Return where a contact of single dofs is drawn: below a mass that touches the ground, else between both."""
+    """Return the position at which a contact of single dofs is drawn.
+
+    It is below a mass that touches the ground, else between both dofs.
+    """
     here = row.get(dof, places.dofs.position[dof])
     if other == GROUND or other.startswith(NEXT):
         return np.asarray(here - [0.0, 0.0, _MASS])
@@ -295,7 +303,7 @@ def _beside(places: Places, row: dict[int, FloatArray], dof: int, other: str) ->
 def _load(
     places: Places, name: str, load: Load, row: dict[int, FloatArray]
 ) -> tuple[str, FloatArray, FloatArray] | None:
-    """Return the name of a load, where it acts, and its direction; None for pressure fields, which act everywhere."""
+    """Return the name of a load, its point and its direction; None for pressure fields, which act on whole surfaces."""
     if load.field is not None:
         return None
     spot = places.spot(load.on, f"load.{name}.on")

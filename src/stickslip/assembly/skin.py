@@ -12,7 +12,7 @@ from stickslip.model.part import Part
 
 
 def skin_of(parts: Mapping[str, Part]) -> Skin | None:
-    """Return the outer surface of all meshes by their corner nodes; None where no part has a mesh."""
+    """Return the outer surface of all meshes by their corner nodes; None if no part has a mesh."""
     points, triangles, cuts = [], [], []
     count = 0
     for part in parts.values():
@@ -43,7 +43,7 @@ def on_skin(places: Places, field: Matrix) -> Matrix:
 
 
 def mesh_dofs(part: Part, mesh: SolidMesh) -> tuple[IntArray, IntArray, IntArray]:
-    """Return a part's dofs that are displacements of nodes of its mesh, the nodes (indices), and their components (0, 1, 2)."""
+    """Return a part's dofs that are mesh displacements, their nodes (indices), and their components (0, 1, 2)."""
     table = part.structure.dofs
     order = np.argsort(mesh.numbers, kind="stable")
     at = np.searchsorted(mesh.numbers, table.node, sorter=order)
@@ -55,7 +55,7 @@ def mesh_dofs(part: Part, mesh: SolidMesh) -> tuple[IntArray, IntArray, IntArray
 
 
 def _cut(part: Part, mesh: SolidMesh, skin: IntArray) -> IntArray:
-    """Return 1 for triangles on a cyclic face: all corners on the face or clamped, and one at least on the face."""
+    """Return 1 for triangles on a cyclic face: all corners are on it or clamped, and at least one is on it."""
     cut = np.zeros(len(skin), dtype=np.int64)
     if part.sectors == 1:
         return cut

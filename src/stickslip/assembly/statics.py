@@ -1,4 +1,4 @@
-"""Static displacements under the centrifugal load: of joined parts together, and how large they are."""
+"""Static displacements of joined parts under the centrifugal load, and check of their size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from stickslip.model.part import Part
 from stickslip.model.structure import join
 
 MOST_STRAIN = 0.01  # several times the yield strain of alloys for disks and blades
-MOST_ROTATION = 0.05  # rad; linear statics leaves out its square
-MOST_DISPLACEMENT = 0.02  # of the largest radius
+MOST_ROTATION = 0.05  # rad; linear statics neglects its square
+MOST_DISPLACEMENT = 0.02  # share of the largest radius
 
 
 def joined_displacements(
@@ -96,11 +96,14 @@ class StaticState:
             and self.rotation <= MOST_ROTATION
             and self.displacement <= MOST_DISPLACEMENT * self.radius
         )
-        return not small  # nor is what is no number small
+        return not small  # NaN counts as too large
 
 
 def static_state(parts: Mapping[str, Part], displacement: Mapping[str, FloatArray], speed: float) -> StaticState | None:
-    """Return the static state of parts from the displacements (nodes, 3), m, of their meshes at a speed in rad/s; None without any."""
+    """Return the static state of parts from the displacements (nodes, 3), m, of their meshes at a speed in rad/s.
+
+    None without displacements.
+    """
     rows = []
     for name, moved in displacement.items():
         part = parts[name]

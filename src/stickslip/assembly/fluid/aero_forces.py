@@ -25,12 +25,12 @@ from stickslip.reduction.waves import wave
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
-TIE = 1e-4  # share by which components of a mode have to differ for the larger one to fix its phase
+TIE = 1e-4  # largest relative difference of components of a mode that count as equal when its phase is fixed
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """Aerodynamic force on a model at a speed; `flow_around` in `build` makes it.
+    """Aerodynamic force on a model at a speed; build it with `build.flow_around`.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ class Flow:
         return self._remembered(f"{number}", lambda: self._of_wave(number))
 
     def on(self, wave_number: int, patterns: Matrix) -> Feedback:
-        """Return the force on a wave from the force patterns in coordinates of the wave."""
+        """Return the force on a wave from the force patterns in the coordinates of the wave."""
         angle = wave(wave_number, self.model.sectors).phase_angle
         return Feedback(patterns, angle, self.influence, self.given.reference)
 
     def on_structure(self, wave_number: int, moving: Structure) -> Feedback:
-        """Return the force on a wave whose `basis` leads to the dofs of all parts, such as one of `Model.at`."""
+        """Return the force on a wave whose `basis` maps to the dofs of all parts, as from `Model.at`."""
         return self.on(wave_number, np.asarray(moving.project(self.patterns(wave_number))))
 
     @property
@@ -91,7 +91,7 @@ class Flow:
         return np.asarray(force_at(self.model.places, f"aero.points.{name}", load))
 
     def _of_wave(self, number: int) -> Matrix:
-        """Return ``M φ`` of the modes of a wave; real ones where they are those of all waves."""
+        """Return ``M φ`` of the modes of a wave; real modes if they are used for all waves."""
         moving = self.model.at(self.speed, number, self.holds)
         modes = self._modes(moving, f"modes of wave {number}")
         shapes = np.asarray(moving.expand(modes))
@@ -103,7 +103,7 @@ class Flow:
         return np.asarray(mass @ shapes) / self._scale(shapes)
 
     def _of_blade(self) -> Matrix:
-        """Return ``M φ`` of the modes of a part with its root and its cyclic faces held, zero on all others."""
+        """Return ``M φ`` of the modes of a part with its root and its cyclic faces held, zero on all other parts."""
         model, clamped = self.model, self.given.clamped
         spot = model.places.spot(clamped, "aero.clamped")
         part, own = model.parts[spot.part], model.places.own(spot.part)
@@ -133,7 +133,7 @@ class Flow:
             raise error.inside(f"aero: {what}") from None
 
     def _scale(self, shapes: Matrix) -> FloatArray:
-        """Return the factors (m,) by which the user's modes are larger than these ones of unit mass."""
+        """Return the factors (m,) from these modes of unit mass to the modes of the user."""
         given, places = self.given, self.model.places
         if given.largest_displacement is None:
             return np.ones(shapes.shape[1])
@@ -174,7 +174,7 @@ def own_dofs(model: Model) -> IntArray:
 def phases(shapes: Matrix, own: IntArray) -> ComplexArray | FloatArray:
     """Return the (m,) factors that make the largest component of each shape (n, m) on the dofs `own` real and positive.
 
-    Among components that are equal to within `TIE` the first one decides, so that rounding does not.
+    Among components that are equal to within `TIE` the first one is taken, so that rounding does not decide.
     """
     sizes = np.abs(shapes[own])
     top = own[(sizes >= (1 - TIE) * sizes.max(axis=0)).argmax(axis=0)]
@@ -183,7 +183,7 @@ def phases(shapes: Matrix, own: IntArray) -> ComplexArray | FloatArray:
 
 
 def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
-    """Return the (m,) largest nodal displacements of shapes (n, m). A dof without a node counts by itself."""
+    """Return the (m,) largest nodal displacements of shapes (n, m). A dof without a node counts separately."""
     along = np.isin(np.array(table.component), AXES)
     parts = np.array(table.part) if table.part else np.full(len(table), "")
     squares = np.abs(shapes) ** 2
@@ -199,7 +199,9 @@ def largest_displacements(table: Dofs, shapes: Matrix) -> FloatArray:
 
 
 def about_static_state(system: System, load: HarmonicLoad, fluid: Matrix | None) -> HarmonicLoad:
-    """Return the load with a static force that keeps the static state of the model without fluid, since coefficients describe motion about it.
+    """Return the load with a static force that keeps the static state of the model without fluid.
+
+    Aerodynamic coefficients describe the motion about the static state, which therefore must not change.
 
     Parameters
     ----------

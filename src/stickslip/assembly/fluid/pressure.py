@@ -1,4 +1,4 @@
-"""Pressure fields of a flow solver as nodal forces: each point goes to the nearest facet with its normal."""
+"""Pressure fields of a flow solver as nodal forces: each point acts on the nearest facet with its normal."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,17 +13,19 @@ from stickslip.contact.projection import closest, facet_balls
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
-FAR = 0.1  # of the surface's size: no flow solver's mesh stands so far off
-BETWEEN = 0.1  # share of the points of a field that may stand nearer to the middle of a thin body than to its surface
-AROUND = 8  # points of a field from which the pressure between them follows
-ELSEWHERE = 1.2  # distance of a place from the field over that of the field's points from each other: from here on the field is elsewhere
-BARE = 0.1, 0.25  # share of a surface where the field is elsewhere: told, refused
+# largest distance of a field from a surface, relative to the surface's size: no flow solver's mesh is so far away
+FAR = 0.1
+BETWEEN = 0.1  # largest share of points closer to the middle of a thin body than to its surface
+AROUND = 8  # neighbouring points from which the pressure is interpolated
+# distance of a position from the field, relative to the spacing of its points, above which the field does not cover it
+ELSEWHERE = 1.2
+BARE = 0.1, 0.25  # share of an uncovered surface: reported, refused
 PLANE = 1e-6  # singular values below this share of the largest: the points lie on a line
-CANDIDATE_FACETS = 8  # facets, by their middles, among which the one of a point is looked for
-ACROSS = 0.5  # cosine to a facet's normal below which a point rather belongs to another facet
-AVERTED = -0.2  # below this the facet belongs to the other side
-CLEAR = 0.5  # of the misfit of one sense of all normals to that of the other: there is no doubt
-MIXED = 0.01  # share of the area beyond which normals of the wrong sense are no accident
+CANDIDATE_FACETS = 8  # nearest facets, by their centres, among which the facet of a point is selected
+ACROSS = 0.5  # cosine to a facet's normal below which another facet is preferred
+AVERTED = -0.2  # cosine below which the facet is on the other side
+CLEAR = 0.5  # ratio of misfits of both orientations of the normals below which the orientation is certain
+MIXED = 0.01  # share of the area above which wrong normals are not accidental
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,12 @@ class PressureField:
     Parameters
     ----------
     points
-        (n, 3) places in m, in the axes of the model.
+        (n, 3) positions in m, in the axes of the model.
     pressure
         (n,) in Pa: positive presses on the surface.
     area
-        (n, 3) vector of the area in m² that belongs to each point, normal to the surface; all point out of the body, or all into it.
-        None: the pressure is interpolated and integrated on the facets of the structure.
+        (n, 3) area vector of each point in m², normal to the surface; all point out of the body, or all into it. None:
+        the pressure is interpolated and integrated on the facets of the structure.
     source
         File or origin of the field, for messages.
 
@@ -63,12 +65,15 @@ class PressureField:
             )
 
     def on(self, places: Places, name: str, place: str) -> "Projected":
-        """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the study key of the surface.
+        """Return the field as forces on the nodes of a surface and of its clamped rim.
+
+        `place` is the study key of the surface.
 
         Raises
         ------
         InputError
-            If the surface has no facets, the field lies elsewhere, or its normals point partly out of the body and partly into it.
+            If the surface has no facets, the field is elsewhere, or its normals point partly out of the body and partly
+            into it.
         """
         spot = places.spot(name, place)
         surface = _with_facets(spot, place)
@@ -131,13 +136,13 @@ class Feet:
     Parameters
     ----------
     facet, reference
-        (n,) facet of each point, and (n, 2) its local coordinates there.
+        (n,) facet of each point, and (n, 2) its local coordinates on it.
     offset
         (n,) distance from the facet, m.
     sense
-        1 where the normals of the field point out of the body, -1 where they point into it.
+        1 if the normals of the field point out of the body, -1 if they point into it.
     misfit
-        (n,) distance, m, enlarged where the normals of facet and point differ.
+        (n,) distance, m, enlarged if the normals of facet and point differ.
     """
 
     facet: IntArray
@@ -148,7 +153,7 @@ class Feet:
 
 
 def put_on(given: PressureField, surface: Surface, name: str) -> Projected:
-    """Return a field as forces on the nodes of a surface; `name` is that of the surface, for messages.
+    """Return a field as forces on the nodes of a surface; `name` is the name of the surface, for messages.
 
     Raises
     ------
@@ -205,7 +210,10 @@ def _sums(points: FloatArray, forces: ComplexArray) -> ComplexArray:
 def _integrated(
     given: PressureField, surface: Surface, feet: Feet
 ) -> tuple[IntArray, FloatArray, FloatArray, ComplexArray, float]:
-    """Return quadrature points on the facets, their places and the forces of the interpolated pressure there, and the share of bare area."""
+    """Integrate the interpolated pressure over the facets.
+
+    Return quadrature points on the facets, their positions, the forces there, and the uncovered area share.
+    """
     x, w = np.polynomial.legendre.leggauss(4)
     square = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
     weights = np.outer(w, w).ravel()
@@ -228,7 +236,7 @@ def _integrated(
 
 
 def _bare(share: float, source: str, name: str) -> tuple[str, ...]:
-    """Warn of a field that covers only part of a surface, or refuse it."""
+    """Warn of a field that covers a surface only partly, or refuse it."""
     told, refused = BARE
     if share <= told:
         return ()
@@ -242,10 +250,12 @@ def _bare(share: float, source: str, name: str) -> tuple[str, ...]:
 def _interpolated(
     given: PressureField, theirs: FloatArray, places: FloatArray, outward: FloatArray
 ) -> tuple[ComplexArray, BoolArray]:
-    """Return the pressure at places, and where the field is elsewhere: by a plane through the nearest points, the nearer the heavier; between all of them.
+    """Return the pressure at positions, and where the field does not cover them.
 
-    Points count as nearer where the normals of their facets, `theirs`, are alike to those of the places, `outward`: a thin body has
-    another pressure on its other side. The plane lies along the surface, so that points may stand off it.
+    A plane is fitted through the nearest points, with larger weights for nearer ones; the result stays within their
+    range. Points count as nearer if the normals of their facets, `theirs`, are similar to the normals at the positions,
+    `outward`: a thin body has another pressure on its other side. The plane lies along the surface, so that points may
+    be off the surface.
     """
     from scipy.spatial import cKDTree
 
@@ -262,7 +272,7 @@ def _interpolated(
     inverse = np.linalg.pinv(weight[:, :, None] * rows, rcond=PLANE)
     values = given.pressure[near]
     found = np.einsum("pk,pk->p", inverse[:, 0], weight * values)
-    # no pressure beyond those around it
+    # the pressure stays within the range of the surrounding points
     low, high = (part(values.real, axis=1) for part in (np.min, np.max))
     below, above = (part(values.imag, axis=1) for part in (np.min, np.max))
     inside = np.clip(found.real, low, high) + 1j * np.clip(found.imag, below, above)
@@ -278,14 +288,16 @@ def nearest(surface: Surface, points: FloatArray) -> Feet:
 def on_sides(
     surface: Surface, points: FloatArray, area: FloatArray, reach: float, source: str, name: str
 ) -> tuple[Feet, tuple[str, ...]]:
-    """Return the nearest facet with the normal of each point, all normals out of the body or all into it, and warnings.
+    """Return the nearest facet with the normal of each point, and warnings.
+
+    All normals point out of the body, or all into it.
 
     Parameters
     ----------
     surface, points
-        Facets, and (n, 3) places.
+        Facets, and (n, 3) positions.
     area
-        (n, 3) vectors of areas.
+        (n, 3) area vectors.
     reach
         Largest distance of a point from its facet, m.
     source, name
@@ -349,7 +361,10 @@ def on_sides(
 
 
 def between_sides(surface: Surface, feet: Feet, points: FloatArray, reach: float) -> float:
-    """Return the share of points whose distance from the nearest facet is above half their distance from the other side of the body."""
+    """Return the share of points between both sides of the body.
+
+    They are farther from the nearest facet than half their distance from the other side.
+    """
     middle, _ = facet_balls(surface)
     facing = unit_normals(surface, np.arange(len(surface.facets)), centres(surface.facets))
     unit = -facing[feet.facet]
@@ -368,7 +383,10 @@ def _near(middle: FloatArray, points: FloatArray) -> IntArray:
 def _best(
     surface: Surface, points: FloatArray, candidates: IntArray, side: tuple[FloatArray, FloatArray, float, float] | None
 ) -> Feet:
-    """Return the best of some facets (n, k) for each point; `side`: normals of facets and points, their sense, the reach."""
+    """Return the best of some facets (n, k) for each point.
+
+    `side`: normals of facets and points, orientation, reach.
+    """
     n = len(points)
     best, offset = np.full(n, np.inf), np.zeros(n)
     facet, reference = np.zeros(n, dtype=np.int64), np.zeros((n, 2))
@@ -398,6 +416,6 @@ def _best(
 
 
 def unit_normals(surface: Surface, facet: IntArray, reference: FloatArray) -> FloatArray:
-    """Return the outward unit normals at places (n, 2) on facets (n,)."""
+    """Return the outward unit normals at local coordinates (n, 2) on facets (n,)."""
     normal = normals(surface.points, surface.facets[facet], reference)
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""Normals and tangents of contact surfaces: those of their own frames or facets, or of the other side."""
+"""Normals and tangents of contact surfaces, from their own frames or facets, or from the other side."""
 
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
@@ -13,7 +13,7 @@ from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 from stickslip.units import quantity_of
 
-SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do for t
+SQUARE = 0.3  # sine of the angle with a normal above which a direction is accepted for t
 
 
 def whole(surface: Surface) -> bool:
@@ -24,7 +24,7 @@ def whole(surface: Surface) -> bool:
 def with_normals(
     key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Surface:
-    """Return side A with normals: from its frames or facets, from the contact, or opposite to those of side B."""
+    """Return side A with normals: from its frames or facets, from the contact, or opposite to the normals of side B."""
     from scipy.spatial import cKDTree
 
     if contact.normal is not None:
@@ -33,7 +33,7 @@ def with_normals(
         return replace(a, normals=first.frame[:, :, 2])
     if whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
         return a
-    if len(a.facets):  # nodes that span no facet take the normal of the nearest one that does
+    if len(a.facets):  # nodes that span no facet take the normal of the nearest node with one
         near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
         return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
     theirs = None if second is None or b is None else normals_of(second, b)
@@ -49,7 +49,7 @@ def with_normals(
 
 
 def _named(key: str, normal: tuple[float, float, float], first: Spot, a: Surface) -> FloatArray:
-    """Return the normal that a contact names at each point; refuse it where the surface has its own."""
+    """Return the normal given by a contact, at each point; refuse it if the surface has normals of its own."""
     length = float(np.linalg.norm(normal))
     if first.frame is not None or len(a.facets):
         raise input_error(
@@ -74,7 +74,10 @@ def normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | 
 def direction(
     key: str, contact: Contact, law: ContactLaw, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Any:
-    """Return the direction of t: from the contact or from the frames; any direction where the law is the same along t and w."""
+    """Return the direction of t, from the contact or from the frames.
+
+    Any direction if the law is the same along t and w.
+    """
     from scipy.spatial import cKDTree
 
     if contact.tangent is not None:
@@ -97,7 +100,7 @@ def direction(
 
 
 def told_apart(law: Any, *, per_area: bool) -> str:
-    """Return the keys of the parameters ``NAME_t`` and ``NAME_w`` in which a law differs along t and w; empty without a difference."""
+    """Return the keys of the parameters ``NAME_t`` and ``NAME_w`` that differ in a law; empty without a difference."""
     known = {entry.name: entry for entry in fields(law)} if is_dataclass(law) else {}
     said = []
     for name, entry in known.items():

@@ -1,4 +1,4 @@
-"""Gaps as coordinates: of rigid contacts, and where contact points need fewer coordinates than the nodes around them."""
+"""Gaps as coordinates, for rigid contacts and for contact points with fewer gaps than nodal coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ class InGaps:
     structure, gaps
         The structure, and (3 p, n) CSR from its coordinates to the gaps.
     place
-        (n0,) new position of each previous coordinate; -1 where gaps replace it; None: no coordinate changed.
+        (n0,) new position of each previous coordinate; -1 if gaps replace it; None: no coordinate changed.
     """
 
     structure: Structure
@@ -57,7 +57,7 @@ class InGaps:
 
 
 def in_gaps(pairs: Pairs, structure: Structure, gaps: Matrix) -> InGaps:
-    """Use the gaps of all contacts as coordinates, if a contact is rigid and its gaps are no coordinates yet.
+    """Use the gaps of all contacts as coordinates, if a contact is rigid and its gaps are not coordinates yet.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def are_coordinates(gaps: Matrix, rigid: BoolArray) -> bool:
 
 
 def refuse_mixed_gaps(model: Model, gaps: Matrix) -> None:
-    """Refuse rigid contacts of a wheel whose gaps (3 p, n) are no coordinates."""
+    """Refuse rigid contacts of a wheel whose gaps (3 p, n) are not coordinates."""
     rigid = _rigid(model.pairs)
     if not are_coordinates(scipy.sparse.csr_array(gaps), rigid):
         raise input_error(
@@ -112,7 +112,7 @@ def _rigid(pairs: Pairs) -> BoolArray:
 
 
 def refuse_rigid(model: Model) -> None:
-    """Refuse unsolvable rigid contacts: those of free rigid bodies, and those of single dofs without a normal force."""
+    """Refuse unsolvable rigid contacts: of free rigid bodies, and of single dofs without a normal force."""
     pairs, laws = model.pairs, dict(zip(model.pairs.groups, model.pairs.laws, strict=True))
     for name, law in laws.items():
         if not isinstance(law, Rigid):
@@ -136,10 +136,10 @@ def refuse_rigid(model: Model) -> None:
 
 
 def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequence[str]) -> InGaps:
-    """Use the gaps of a reduced structure as coordinates where contacts then act on fewer coordinates.
+    """Use the gaps of a reduced structure as coordinates if contacts then act on fewer coordinates.
 
-    A point on a facet of six nodes acts on 18 dofs and has three gaps. The contribution of the coordinates `stay` remains in the gap
-    operator. The new coordinate is then the motion of the other side at that point.
+    A point on a facet of six nodes acts on 18 dofs and has three gaps. The contribution of the coordinates `stay`
+    remains in the gap operator; the new coordinate is then the motion of the other side at that point.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def in_points(structure: Structure, gaps: Matrix, stay: IntArray, names: Sequenc
         return same
     try:
         written, own = in_relative_coordinates(replace(structure, basis=None), moved, names)
-    except InputError:  # rows depend on each other: nodes stay
+    except InputError:  # rows depend on each other: nodes are kept
         return same
     place = np.full(structure.n, -1)
     free = np.setdiff1d(np.arange(structure.n), touched)

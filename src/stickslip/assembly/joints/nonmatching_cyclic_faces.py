@@ -15,11 +15,11 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.waves import check_sectors
 
 KEY = "cyclic"
-ON_AXIS = 1e-5  # of the size of a face, m/m
+ON_AXIS = 1e-5  # relative to the size of a face, m/m
 
 
 def unlike_faces(part: Part) -> CyclicSector:
-    """Tie the cyclic faces of a sector in the mean.
+    """Tie the cyclic faces of a sector by the mortar method.
 
     Parameters
     ----------
@@ -29,7 +29,8 @@ def unlike_faces(part: Part) -> CyclicSector:
     Raises
     ------
     InputError
-        If there is no mesh, the faces do not cover each other, or a node lies on the axis or is clamped in some directions.
+        If there is no mesh, the faces do not cover each other, or a node lies on the axis or is clamped in some
+        directions.
     """
     check_sectors("part", part.sectors)
     if part.mesh is None:
@@ -53,7 +54,7 @@ def unlike_faces(part: Part) -> CyclicSector:
 
 
 def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
-    """Return a cut face with the nodes that a clamp took from its set, and the (n, 3) dofs of its nodes, -1 where they are held."""
+    """Return a cyclic face including clamped nodes, and the (n, 3) dofs of its nodes, -1 if they are held."""
     mesh = part.mesh
     assert mesh is not None
     free, held = mesh.node_sets.get(name), _held(part.structure, mesh.numbers)
@@ -84,12 +85,12 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
 
 
 def _held(structure: Structure, numbers: IntArray) -> BoolArray:
-    """Return which nodes of a mesh have no dof."""
+    """Return whether each node of a mesh has no dof."""
     return np.asarray(~(node_rows(structure.dofs, numbers) >= 0).any(axis=1))
 
 
 def _told(part: Part, error: InputError) -> InputError:
-    """Name the faces instead of the sides of a pairing."""
+    """Return an error that names the faces instead of the sides of a pairing."""
     low, high = part.faces
     return input_error(
         KEY,

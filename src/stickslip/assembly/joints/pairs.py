@@ -1,4 +1,4 @@
-"""Contacts of a model as pairs of points, on the dofs of all parts: gaps, frames, areas, and each point's share of the law."""
+"""Contacts of a model as pairs of points on the dofs of all parts: gaps, frames, areas, and the law of each point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -33,7 +33,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
 from stickslip.reduction.turning import dof_rotation
 
-NODE_TO_NODE_DISTANCE_M = 1e-6  # m: partners node to node
+NODE_TO_NODE_DISTANCE_M = 1e-6  # largest distance of partners node to node
 ROWS = {"tangential": 0, "normal": 2}
 
 
@@ -46,7 +46,7 @@ class Turn:
     sectors
         Number of sectors of the wheel.
     axis
-        Axis of the wheel; None where coordinates do not change from sector to sector.
+        Axis of the wheel; None if coordinates do not change from sector to sector.
     """
 
     sectors: int
@@ -71,15 +71,16 @@ class Pairs:
     Parameters
     ----------
     own, following
-        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, with u_next the dofs of the next sector in its own axes.
+        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, with u_next the dofs of the next sector in its
+        own axes.
     names, groups
         Name of each point, and of its contact.
     laws
         Law of each point, its share of the law of the contact.
     position, frame, area
-        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where unknown.
+        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN if unknown.
     nodes
-        (p, 3) dofs x, y, z of the node at a point, on the first side, or on the second where the first is a rigid body; -1
+        (p, 3) dofs x, y, z of the node at a point, on the first side, or on the second if the first is a rigid body; -1
         without a node.
     warnings
         Warnings for the user.
@@ -107,7 +108,7 @@ def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | 
     contacts
         Name -> contact.
     turn
-        Rotation from sector to sector; None where the model is no sector.
+        Rotation from sector to sector; None if the model is not a sector.
 
     Raises
     ------
@@ -182,7 +183,7 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
 
 
 def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArray:
-    """Return the dofs of the node that each point is."""
+    """Return the dofs of the node at each point."""
     assert first.surface is not None
     p = own.shape[0] // 3
     found = np.full((p, 3), -1, dtype=np.int64)
@@ -203,7 +204,10 @@ def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArr
 def sides(
     places: Places, key: str, contact: Contact | Join, turn: Turn | None
 ) -> tuple[Spot, Spot | None, Turn | None]:
-    """Return both sides of a contact or join (None: ground), and the rotation of the second where it belongs to the next sector."""
+    """Return both sides of a contact or join (None: ground).
+
+    Also return the rotation of the second side if it belongs to the next sector.
+    """
     one, two = contact.between
     place = f"{key}.between"
     if one.startswith(NEXT) or one == GROUND:
@@ -248,7 +252,7 @@ def _paired(
     *,
     hints: bool = True,
 ) -> tuple[Pairing, tuple[str, ...]]:
-    """Pair two surfaces, and return warnings; with a rotation the dofs of the next sector follow those of this one."""
+    """Pair two surfaces, and return warnings; with a rotation, dofs of the next sector follow those of this sector."""
     assert first.surface is not None
     a, b = widened(first.surface, second, turn)
     facing = with_normals(key, contact, first, a, second, b)
@@ -288,7 +292,7 @@ def _exchanged(
     second: Spot,
     turn: Turn,
 ) -> InputError:
-    """Return an error about surfaces of neighbouring sectors; where they match with the surfaces exchanged, it says so."""
+    """Return an error about surfaces of neighbouring sectors; it says so if they match after an exchange."""
     one, two = contact.between
     other = two.removeprefix(NEXT), f"{NEXT}{one}"
     exchanged = replace(contact, between=other)
@@ -301,7 +305,7 @@ def _exchanged(
 
 
 def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
-    """Pair two surfaces as a contact or join says."""
+    """Pair two surfaces by the method of a contact or join."""
     reach = contact.tolerance
     if contact.pairing == "node_to_node":
         return node_to_node(a, b, tolerance=NODE_TO_NODE_DISTANCE_M if reach is None else reach, direction=along)
@@ -311,7 +315,10 @@ def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairin
 
 
 def widened(first: Surface, second: Spot | None, turn: Turn | None) -> tuple[Surface, Surface | None]:
-    """Return both surfaces, the second rotated to the next sector, on the dofs of this sector followed by those of the next."""
+    """Return both surfaces on the dofs of this sector followed by those of the next.
+
+    The second is rotated to the next sector.
+    """
     if second is None:
         return first, None
     b = second.surface
@@ -366,7 +373,7 @@ def _single_dofs(
 
 
 def _refuse_unused(key: str, contact: Contact) -> None:
-    """Refuse keys of surfaces in a contact of single dofs."""
+    """Refuse surface keys in a contact of single dofs."""
     pairing = None if contact.pairing == "node_to_node" else contact.pairing
     said = {"pairing": pairing, "normal": contact.normal, "tangent": contact.tangent}
     for word, given in said.items():
@@ -379,7 +386,10 @@ def _refuse_unused(key: str, contact: Contact) -> None:
 
 
 def _turned_dofs(places: Places, key: str, name: str, turn: Turn) -> Matrix:
-    """Return the (N, N) matrix from the next sector's dofs in its own axes to those along the axes of this one; masses on a line have none."""
+    """Return the (N, N) matrix from the next sector's dofs in its own axes to those along the axes of this sector.
+
+    Masses on a line have no axes.
+    """
     part, n = places.parts[name], places.n
     if turn.axis is None or (part.body is None and part.mesh is None):
         return scipy.sparse.eye_array(n, format="csr")
@@ -417,7 +427,7 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
 
 
 def _without(law: Any, missing: list[str]) -> tuple[str, ...]:
-    """Return why a law without fields takes no preload and no gap; and what helps, if it is a law of one's own."""
+    """Return the reason why a law without these fields takes no preload and no gap, and a remedy for a user's law."""
     if law_name(law) in tuple(LAWS):
         return ("has a normal force that does not depend on how far the bodies are apart",)
     names = " and no field ".join(f"`{name}`" for name in missing)
@@ -433,7 +443,7 @@ def _at_rest_alike(
     why: str,
     remedy: str = "Choose a law that is pressed and lifts off, such as elastic_coulomb, or leave it out.",
 ) -> InputError:
-    """Refuse a preload, gap or interference without effect, by its key and its name in Python."""
+    """Return an error about a preload, gap or interference without effect, with its key and its name in Python."""
     preload = "preload_pa" if contact.share == "area" else "preload_n"
     word = preload if contact.preload else "gap_m" if contact.gap > 0.0 else "interference_m"
     given = f"preload={contact.preload:g}" if contact.preload else f"gap={contact.gap:g}"
@@ -445,7 +455,7 @@ def _at_rest_alike(
 def _shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tuple[ContactLaw, ...]:
     """Return the law of each point."""
     p, known = len(area), bool(np.all(np.isfinite(area)))
-    alike = isinstance(law, Rigid) and law.preload is None  # nothing of it is shared
+    alike = isinstance(law, Rigid) and law.preload is None  # without parameters that could be shared
     if contact.share == "point" or alike:
         return (law,) * p
     if contact.share == "interface":

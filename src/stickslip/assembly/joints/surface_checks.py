@@ -18,11 +18,12 @@ from stickslip.errors import InputError, input_error
 
 Found = TypeVar("Found")
 
-TILTED = 3.0  # degrees from opposite at which a rigid body is perhaps turned wrongly: meshes are off by less
-STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
-OFF = 1e-3  # of a facet's radius: what surfaces that touch may be off everywhere, by rounding in their files
-DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
-FLAT = 1e-9  # part of a motion along a normal that is rounding
+TILTED = 3.0  # degrees from opposite normals at which a rigid body may be rotated wrongly: meshes deviate less
+STEEPEST = 45.0  # degrees from opposite normals at which surfaces cannot be meant to touch
+# distance, as a share of a facet's radius, that touching surfaces may have everywhere due to rounding in their files
+OFF = 1e-3
+DEEP = 0.05  # overlap, as a share of a facet's radius, that facets of curved surfaces do not exceed
+FLAT = 1e-9  # relative motion along a normal that is rounding
 MEET_FACETS = 'Give pairing = "node_to_segment": each point of a rigid body meets a facet'
 TENFOLD = "ten times the largest of these distances or more"  # a node may stand a tenth of the tolerance beyond a rim
 NAMED = 5  # points that a message names
@@ -30,14 +31,14 @@ Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
 
 
 def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | None) -> None:
-    """Refuse surfaces whose normals do not point against each other.
+    """Refuse surfaces whose normals are not opposite to each other.
 
     Parameters
     ----------
     key, contact
         Key ``contact.NAME``, and the contact.
     mine, theirs
-        Points and outward normals of both sides; None where the second side has no normals.
+        Points and outward normals of both sides; None if the second side has no normals.
     """
     if theirs is None or not len(mine[0]):
         return
@@ -70,17 +71,17 @@ def refuse_without_facets(key: str, contact: Contact, a: Surface, b: Surface) ->
 
 
 def with_pairing(error: InputError, contact: Contact, a: Surface, b: Surface) -> InputError:
-    """Return an error about points without partners. For points that meet facets it names the suitable pairing."""
+    """Return an error about points without partners; for points that meet facets it names the suitable pairing."""
     if contact.pairing != "node_to_node" or len(a.facets) or not len(b.facets):
         return error
     return input_error(error.place, error.problem, f"{MEET_FACETS}.")
 
 
 def tilt_warning(key: str, contact: Contact, part: str, mine: Normals, theirs: Normals | None) -> tuple[str, ...]:
-    """Warn of a rigid part without a point that lies flat on the other surface; arguments as in `refuse_averted`."""
+    """Warn of a rigid part with no point flat on the other surface; arguments as in `refuse_averted`."""
     if theirs is None or not len(mine[0]):
         return ()
-    angle = float(np.min(_from_opposite(mine, theirs)))  # a curved surface is flat on it somewhere
+    angle = float(np.min(_from_opposite(mine, theirs)))  # a curved surface is flat on the other one somewhere
     if angle < TILTED:
         return ()
     one, two = contact.between
@@ -108,7 +109,7 @@ def _mean(normals: FloatArray) -> str:
 
 
 def overlap_warning(key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]) -> tuple[str, ...]:
-    """Warn of surfaces that overlap by more than facet error and interference explain, or that touch nowhere."""
+    """Warn of surfaces that overlap by more than facet error and interference, or that touch nowhere."""
     sizes = [float(np.median(facet_balls(side)[1])) for side in sides if len(side.facets)]
     worst = int(np.argmin(pairing.initial_gap))
     deep = float(-pairing.initial_gap[worst])
@@ -169,7 +170,7 @@ def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]
 
 
 def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:
-    """Warn of facets that a surface lacks at its rim, because readers remove clamped nodes from node sets."""
+    """Warn of facets missing at the rim of a surface, because readers remove clamped nodes from node sets."""
     mesh, (rim, left) = places.parts[spot.part].mesh, clamped_rim(places, spot)
     if mesh is None or spot.surface is None or not left.size:
         return ()
@@ -183,12 +184,12 @@ def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:
 
 
 def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
-    """Warn of contacts between surfaces that join the same dofs.
+    """Warn of contacts between surfaces with the same dofs.
 
     Parameters
     ----------
     found
-        Name of a contact -> its gap rows (3 p, N), and whether it joins surfaces.
+        Name of a contact -> its gap rows (3 p, N), and whether it is between surfaces.
     """
     touched: dict[str, frozenset[int]] = {
         name: frozenset(np.unique(scipy.sparse.csr_array(rows).indices).tolist())
@@ -203,7 +204,10 @@ def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
 
 
 def refuse_contacts_of_dofs(places: Places, contacts: Mapping[str, Contact]) -> None:
-    """Refuse contacts of single dofs of matrix parts without a direction `acts`; dofs of meshes are checked when they are paired."""
+    """Refuse contacts of single dofs of matrix parts without a direction `acts`.
+
+    Dofs of meshes are checked during pairing.
+    """
     for name, contact in contacts.items():
         part = places.parts.get(contact.between[0].partition(".")[0])
         if contact.acts is None and part is not None and part.mesh is None and part.body is None:
@@ -222,7 +226,7 @@ def refuse_without_direction(name: str, contact: Contact, first: Spot) -> None:
 
 
 def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -> InputError:
-    """Return an error about a surface without partners, with the set of the second part that lies nearest."""
+    """Return an error about a surface without partners that names the nearest set of the second part."""
     assert second.surface is not None
     part = places.parts[second.part]
     own = _distance(first, second.surface.points)
@@ -242,7 +246,7 @@ def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -
 
 
 def _distance(surface: Surface, points: FloatArray) -> float:
-    """Return the distance of a surface's middling point to the nearest of `points`, m."""
+    """Return the median distance of a surface's points to the nearest of `points`, m."""
     from scipy.spatial import cKDTree
 
     return float(np.median(cKDTree(points).query(surface.points[surface.used])[0]))

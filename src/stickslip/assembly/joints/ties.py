@@ -1,4 +1,4 @@
-"""Joins of a model: the first side's dofs follow the second's, ``u = tie @ q``, and the coordinates that are left."""
+"""Joins of a model as ties: ``u = tie @ q``, where the first side's dofs follow the second's."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.basis import in_coordinates, surviving_sets
 
 MEAN = "segment_to_segment"
-TINY = 1e-12  # weights of partners below are rounding
+TINY = 1e-12  # smaller weights of partners are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
 
 
 def _followed(key: str, join: Join, first: Spot, second: Spot, turn: Turn | None) -> dict[int, Matrix]:
-    """Return each dof of the first side with its row of weights; of the next sector, in its own axes."""
+    """Return each dof of the first side with its row of weights, and such rows for the next sector in its own axes."""
     assert first.surface is not None
     assert second.surface is not None
     if first.nodes is None:
@@ -145,7 +145,7 @@ def _by_nodes(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
 
 
 def _in_the_mean(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
-    """Return the motion (3 n_A, N) that side B gives the nodes of side A in the mean."""
+    """Return the motion (3 n_A, N) of the nodes of side A by the mortar tie to side B."""
     weights = named(key, join, lambda: mortar_tie(a, b, reach=join.tolerance))
     return scipy.sparse.csr_array(scipy.sparse.kron(weights, np.eye(3)) @ b.displacement)
 
@@ -158,7 +158,7 @@ def _across(a: Surface) -> tuple[float, float, float]:
 
 
 def _towards(a: Surface, b: Surface) -> Surface:
-    """Return all nodes of side A with normals towards side B; without facets of B any will do."""
+    """Return all nodes of side A with normals towards side B; any normals if B has no facets."""
     from scipy.spatial import cKDTree
 
     normals = np.tile([0.0, 0.0, 1.0], (len(a.points), 1))
@@ -217,7 +217,7 @@ class Coordinates:
     Parameters
     ----------
     ids
-        (n0,) dof of all parts behind each untied coordinate; -1 for modal coordinates.
+        (n0,) dof of all parts for each untied coordinate; -1 for modal coordinates.
     tie
         (n0, n) CSR from independent to untied coordinates; None without ties.
     stays
@@ -242,7 +242,10 @@ class Coordinates:
         return replace(found, basis=None)
 
     def columns(self, operator: Matrix) -> Matrix:
-        """Return an operator (m, N) on the dofs of all parts as one on the coordinates. It must be zero at other dofs."""
+        """Return an operator (m, N) on the dofs of all parts as one on the coordinates.
+
+        It must be zero at other dofs.
+        """
         mine = scipy.sparse.csr_array(operator).tocoo()
         place = np.full(operator.shape[1], -1)
         known = self.ids >= 0
@@ -262,7 +265,10 @@ class Coordinates:
         return untied if self.tie is None else np.asarray(self.tie.T @ untied)
 
     def load_of_dofs(self, force: Matrix) -> Matrix:
-        """Return a force (N,) on the dofs of all parts as one (n,) on the independent coordinates. Forces on other dofs are dropped."""
+        """Return a force (N,) on the dofs of all parts as one (n,) on the independent coordinates.
+
+        Forces on other dofs are dropped.
+        """
         untied = np.zeros(self.ids.size, dtype=force.dtype)
         known = self.ids >= 0
         untied[known] = force[self.ids[known]]

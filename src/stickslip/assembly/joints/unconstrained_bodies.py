@@ -1,4 +1,4 @@
-"""Bodies without supports, contacts or joins: their free motions, and static loads that pull parts off their contacts."""
+"""Free motions of bodies without supports, contacts or joins, and static loads that pull parts off contacts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from stickslip.model.part import Part
 from stickslip.model.rigid.motion import in_words, loose_motions
 from stickslip.response.equilibrium import opening
 
-RANK = 1e-8  # singular value over what rows and motions would give without cancelling, below which a motion strains nothing
-SHARE = 1e-6  # of the largest share of a free motion below which a body takes no part in it
-SLIDERS = ("jenkins", "iwan", "dahl")  # laws of a bounded force that nothing presses
+RANK = 1e-8  # singular value below which a motion causes no strain, relative to the value without cancellation
+SHARE = 1e-6  # share of a free motion, relative to the largest, below which a body is not part of it
+SLIDERS = ("jenkins", "iwan", "dahl")  # laws with a bounded force without normal force
 NAMED = 3  # parts that a message names
-WORK = 1e-6  # of what the loads could do at most, below which work is rounding
-STEEP = 1e3  # friction coefficient taken for a law that names none
+WORK = 1e-6  # work below which it is rounding, relative to the largest work that the loads could do
+STEEP = 1e3  # friction coefficient of laws without one
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +73,18 @@ def unheld(model: Model, holds: BoolArray) -> list[InputError]:
 
 
 def held_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that are free at rest or once all sliders slip; `pressed` (p,) are the contact points pressed at rest."""
+    """Warn of parts that are free at rest, or free once all sliders slip.
+
+    `pressed` (p,) are the contact points pressed at rest.
+    """
     return (*open_warnings(model, pressed), *sliding_warnings(model, pressed))
 
 
 def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that are free at rest; `pressed` (p,) are the contact points pressed by the static loads, the others are open."""
+    """Warn of parts that are free at rest.
+
+    `pressed` (p,) are the contact points pressed by the static loads; the others are open.
+    """
     if np.all(pressed):
         return ()
     return tuple(
@@ -87,7 +93,10 @@ def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
 
 
 def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
-    """Warn of parts that only sliders hold and that are free once all slip; `pressed` (p,) are the contact points pressed at rest."""
+    """Warn of parts that only sliders hold, and that are free once all of them slip.
+
+    `pressed` (p,) are the contact points pressed at rest.
+    """
     slides = np.array([law_name(law) in SLIDERS for law in model.pairs.laws], dtype=bool)
     if not slides.any():
         return ()
@@ -101,7 +110,7 @@ def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
 
 
 def free_motions(model: Model, holds: BoolArray) -> FloatArray:
-    """Return the (N, f) motions of all dofs without any strain while the contact points `holds` (p,) stick."""
+    """Return the (N, f) strain-free motions of all dofs while the contact points `holds` (p,) stick."""
     bodies = _loose(model)
     return _moves(model, bodies) @ _free(model, bodies, holds)
 
@@ -120,7 +129,7 @@ def _moves(model: Model, bodies: list[Loose]) -> FloatArray:
 
 
 def _free(model: Model, bodies: list[Loose], holds: BoolArray) -> FloatArray:
-    """Return the shares (m, f) of the motions of bodies that make one that strains nothing."""
+    """Return the shares (m, f) of the bodies' motions in the strain-free motions."""
     moves = _moves(model, bodies)
     rows = _holding(model, holds)
     strained = np.vstack([one @ moves for one in rows])
@@ -143,7 +152,7 @@ def _loose(model: Model) -> list[Loose]:
 
 
 def _of_part(part: Part) -> list[tuple[IntArray, FloatArray]]:
-    """Return the bodies of a part that are free by themselves, with their motions; remembered."""
+    """Return the free bodies of a part with their motions; they are cached."""
     if "loose" not in part.memo:
         structure = part.structure
         found: list[tuple[IntArray, FloatArray]] = [(np.arange(6), np.eye(6))]
@@ -157,12 +166,12 @@ def _of_part(part: Part) -> list[tuple[IntArray, FloatArray]]:
 
 
 def _alike(part: Part) -> bool:
-    """Whether cyclic faces let a sector move as all others do, and not by itself."""
+    """Whether cyclic faces let a sector move only together with all others."""
     return any(face in part.structure.sets for face in part.faces)
 
 
 def _with_all_sectors(part: Part, dofs: IntArray, motions: FloatArray) -> FloatArray:
-    """Return those free motions of a sector that all sectors have alike: along the axis and about it."""
+    """Return the free motions of a sector that all sectors can have together: along the axis and about it."""
     table, axis = part.structure.dofs.take(dofs), part.axis
     turning = np.cross(axis.unit, table.position - np.asarray(axis.origin))
     column = [("x", "y", "z").index(c) if c in ("x", "y", "z") else -1 for c in table.component]
@@ -179,7 +188,7 @@ def _inside(vector: FloatArray, motions: FloatArray) -> bool:
 
 
 def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
-    """Return rows on the dofs of all parts that vanish where nothing is strained."""
+    """Return rows on the dofs of all parts that are zero for strain-free motions."""
     pairs, ties = model.pairs, model.ties
     stiff = [np.ones(3, dtype=bool) if isinstance(law, Rigid) else holding_directions(law) for law in pairs.laws]
     rows = np.flatnonzero(np.repeat(holds, 3) & np.array(stiff, dtype=bool).reshape(-1))
@@ -212,7 +221,7 @@ def _complaint(model: Model, body: Loose, shapes: FloatArray, *, at_rest: bool) 
 
 
 def _label(part: Part, dof: int) -> str:
-    """Return the name of a dof: of a set that holds it alone, else that of its node."""
+    """Return the name of a dof: of a set that contains only this dof, else of its node."""
     names = [name for name, members in part.structure.sets.items() if list(members) == [dof]]
     return (names or [part.structure.dofs.labels[dof]])[0]
 
@@ -220,15 +229,15 @@ def _label(part: Part, dof: int) -> str:
 def refuse_pulled(model: Model, static: Mapping[str, FloatArray]) -> None:
     """Refuse static loads under which bodies leave their contacts.
 
-    There is no equilibrium if the loads do work on a rigid motion that strains no part and no join, and that opens each contact
-    more steeply than its friction could resist (the dual of: no admissible contact forces balance the loads).
+    There is no equilibrium if the loads do work on a rigid motion that strains no part and no join, and that opens each
+    contact faster than its friction could resist (dual statement: no admissible contact forces balance the loads).
 
     Parameters
     ----------
     model
         The model.
     static
-        (N,) forces on the dofs of all parts, by the key that gives them.
+        (N,) forces on the dofs of all parts, by study key.
 
     Raises
     ------
@@ -264,7 +273,7 @@ def refuse_pulled(model: Model, static: Mapping[str, FloatArray]) -> None:
 
 
 def _resisted(gaps: FloatArray, friction: FloatArray) -> FloatArray:
-    """Return rows that are not positive for motions which contacts that can open, with gaps (p, 3, f), do not resist."""
+    """Return rows that are not positive for motions that opening contacts, with gaps (p, 3, f), do not resist."""
     along, apart = friction * gaps[:, :2], gaps[:, 2]
     signs = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     return np.vstack([a * along[:, 0] + b * along[:, 1] - apart for a, b in signs])
@@ -276,7 +285,10 @@ def _friction(law: ContactLaw) -> FloatArray:
 
 
 def _fewest(model: Model, work: tuple[FloatArray, float], resisted: FloatArray, moves: FloatArray) -> FloatArray | None:
-    """Return a motion that loads drive and contacts do not resist, of one part where there is such a one; None of none."""
+    """Return a motion that loads drive and contacts do not resist, if possible of a single part.
+
+    None if there is none.
+    """
     for name in model.parts:
         others = np.delete(moves, model.places.own(name), axis=0)
         found = _driven(work, resisted, others)
@@ -286,7 +298,10 @@ def _fewest(model: Model, work: tuple[FloatArray, float], resisted: FloatArray, 
 
 
 def _driven(work: tuple[FloatArray, float], resisted: FloatArray, still: FloatArray) -> FloatArray | None:
-    """Return a motion that does more than the least work, for which rows are not positive and others vanish."""
+    """Return a motion with more than the least work, on which `resisted` is not positive and `still` zero.
+
+    None if there is none.
+    """
     own, least = work
     few = np.linalg.qr(still, mode="r") if len(still) else still
     none = np.zeros(len(few))

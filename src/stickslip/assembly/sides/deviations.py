@@ -1,4 +1,4 @@
-"""Mistuning as changes of the wheel's matrices, of low rank."""
+"""Mistuning as low-rank changes of the wheel's matrices."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import of_alike, strip
 from stickslip.units import HZ
 
-FEW_ROWS = 30  # shares of a sector's motion: above, all coordinates of the wheel are no more
+FEW_ROWS = 30  # components of a sector's motion: with more, using all coordinates of the wheel costs no more
 Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s m)
 
 
@@ -74,7 +74,8 @@ class Blade:
     whole
         Whether the blade is the whole part, without a fixed boundary.
     behind
-        (b, N) CSR from the previous sector, whose high face has these dofs, to the same forces; None: no dof lies on a face.
+        (b, N) CSR from the previous sector, whose high face has these dofs, to the same forces; None: no dof lies on a
+        face.
     """
 
     stiffness: Matrix
@@ -85,7 +86,10 @@ class Blade:
 
 
 def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> Blade:
-    """Return the blade of a name ``part`` or ``part.set``, `beyond` a radius in m; `place` is the study key, for messages."""
+    """Return the blade with the name ``part`` or ``part.set``.
+
+    `beyond` is a radius in m, and `place` the study key, for messages.
+    """
     head, _, rest = of.partition(".")
     part = model.places.part_of(head, place)
     structure = at_speed(head, part, model.spin(model.speed), model.steady[head])
@@ -114,7 +118,7 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
     if sector is None:
         return Blade(K[own][:, own], M[own][:, own], K[own] @ wide, whole=False)
     own = _of_one_blade(sector, own, of, place)
-    # a dof of the low face is also the high face of the sector before, whose matrices act on it, too
+    # a dof of the low face is also on the high face of the previous sector, whose matrices act on it, too
     here, there = own_and_onward(sector, own)
     behind = (there.T @ K @ wide).tocsr() if there.nnz else None
     stiffness, mass = (scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M))
@@ -123,7 +127,7 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
 
 
 def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> IntArray:
-    """Return the dofs of a blade without those of the high face, which are the next one's."""
+    """Return the dofs of a blade without the dofs of the high face, which belong to the next blade."""
     if np.isin(own, sector.shared).any():
         raise input_error(place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out.")
     left = np.setdiff1d(own, sector.high)
@@ -145,7 +149,7 @@ def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
     shapes: FloatArray = np.zeros((b, 0))
     asked = 0
     while squares.size < number and asked < every:
-        asked = min(asked + number - squares.size, every)  # rigid ones come first
+        asked = min(asked + number - squares.size, every)  # rigid modes come first
         found = normal_modes(structure, asked)
         strained = found.squares > 0.0
         squares, shapes = found.squares[strained], np.real(found.shapes[:, strained])
@@ -168,7 +172,7 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
     rows = picked(first + np.arange(b), model.places.n) if blade.whole else blade.rows
     behind = None if blade.whole else blade.behind
     if b <= FEW_ROWS:
-        # K = V diag(w) Vᵀ; of a blade that is held, [K K_r]ᵀ K⁻¹ [K K_r]
+        # K = V diag(w) Vᵀ; of a fixed blade [K K_r]ᵀ K⁻¹ [K K_r]
         values, vectors = np.linalg.eigh(blade.stiffness.toarray())
         weights = values if blade.whole else 1.0 / values
         return Deviation(
@@ -185,7 +189,7 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
 
 
 def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
-    """Return the deviation that single modes of the blades carry: each has the share of the motion that is its own."""
+    """Return the deviation of single modes of the blades: each acts on its own share of the motion."""
     squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
     if not squares.size:
         raise input_error(
@@ -200,7 +204,7 @@ def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) 
             "Leave the others out.",
         )
     each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
-    # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
+    # with K φ = ω² M φ, φᵀ [K K_r] u is ω² times the mode's share of u minus the static motion by the rest
     weights = (shapes / np.sqrt(squares)).T
     behind = None if blade.behind is None else scipy.sparse.csr_array(weights @ blade.behind)
     return Deviation(scipy.sparse.csr_array(weights @ blade.rows), each, behind=behind)

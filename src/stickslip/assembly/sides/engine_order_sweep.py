@@ -1,4 +1,4 @@
-"""A model over a range of speeds: reduced at a few speeds, with polynomials between."""
+"""A model over a range of speeds: reduced at a few speeds, with polynomial interpolation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,9 +18,9 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import ModesExchangedError
 from stickslip.reduction.speed_line import AtRest, SpeedLine, speed_nodes
 
-TOLERANCE = 1e-9  # relative, of squares of frequencies and of the static load
+TOLERANCE = 1e-9  # relative, of squared frequencies and of the static load
 INTERVALS = (2, 4, 8, 16)
-DENSE = 1500  # coordinates up to which errors are those of all motions, above of the entries
+DENSE = 1500  # coordinates up to which the error is taken over all motions, and above which over matrix entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class OverSpeed:
     static_force
         (k, p, 3) contact forces under the static loads alone at the speeds of the line, N.
     common
-        Whether the reduction keeps the span of the modes of three speeds at all speeds. It does so where a mode outside the basis would
-        replace a kept one at some speed.
+        Whether the reduction keeps the span of the modes of three speeds at all speeds, as it does if a mode outside
+        the basis would replace a kept one at some speed.
     """
 
     assembled: Assembled
@@ -50,7 +50,10 @@ class OverSpeed:
 
 
 def with_engine_order(model: Model, order: int) -> Model:
-    """Return a model with an engine order for every harmonic load, which keeps its harmonic; a single structure is returned unchanged."""
+    """Return a model with an engine order for every harmonic load, which keeps its harmonic.
+
+    A single structure is returned unchanged.
+    """
     if model.sectors == 1:
         return model
     loads = {
@@ -133,7 +136,7 @@ def _assembled(
         nodes = speed_nodes(*speeds, intervals)
         every = [at(float(s)) for s in nodes]
         line = _line(engine_order, every, nodes)
-        # in the middle between two speeds, which the next attempt takes as well
+        # midway between two speeds, which the next attempt also uses
         beside = float(speed_nodes(*speeds, 2 * intervals)[1 + 2 * (intervals // 2)])
         error = _difference(line, beside, at(beside))
         if error <= tolerance:
@@ -166,7 +169,7 @@ def _at_rest(assembled: Assembled) -> AtRest:
 
 
 def _difference(line: SpeedLine, speed: float, true: Assembled) -> float:
-    """Return the difference of a speed line from the model at a speed."""
+    """Return the difference between a speed line and the model at a speed."""
     mine, theirs = line.at(speed), _at_rest(true)
     orders = range(1 + (line.harmonics or 0))
     pairs = {id(theirs.of_harmonic(h)): (mine.of_harmonic(h), theirs.of_harmonic(h)) for h in orders}
@@ -180,7 +183,7 @@ def _difference(line: SpeedLine, speed: float, true: Assembled) -> float:
 
 
 def _of_structures(mine: Structure, theirs: Structure, omega: float) -> float:
-    """Return the largest relative difference of ``K + iωC - ω²M``, in the energy of any motion, ``K + ω²M``."""
+    """Return the largest difference of ``K + iωC - ω²M``, relative to the energy ``K + ω²M``, over all motions."""
     change = [
         _dense(a) - _dense(b)
         for a, b in ((mine.stiffness, theirs.stiffness), (mine.damping, theirs.damping), (mine.mass, theirs.mass))

@@ -1,4 +1,4 @@
-"""A mistuned wheel as solvers see it: all sectors, their deviations, and the outputs of every blade."""
+"""A mistuned wheel for the solvers: all sectors, their deviations, and the outputs of every blade."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -142,7 +142,7 @@ def _in_a_row(head: str, tail: str, sectors: Sequence[int | None]) -> str:
 
 
 def _peak(what: Asked, model: Model, names: tuple[str, ...]) -> IntArray:
-    """Return the outputs of which the largest counts: the one named, of all sectors where no sector is."""
+    """Return the outputs whose largest amplitude is the peak: the named one, in all sectors if no sector is named."""
     wanted = model.peak_output
     if wanted in names:
         return np.array([names.index(wanted)])
@@ -162,7 +162,7 @@ class AllSectors:
     model
         Model of one sector.
     sector
-        Tuned wheel by all its waves. All sectors have the same coordinates.
+        Tuned wheel with all its waves. All sectors have the same coordinates.
     side
         Linear part of the wheel.
     gaps
@@ -183,7 +183,7 @@ class AllSectors:
         return self.side.n // self.model.sectors
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
-        """Return the coordinates of dofs of the parts in all sectors, sector by sector; `place` is the study key, for messages."""
+        """Return the coordinates of dofs of the parts in all sectors, sector by sector; `place` is the study key."""
         at = self.model.coordinates
         own = self.sector.of_dofs(at.of_dofs(dofs, self.model.places.dofs, place), place)
         return np.asarray((np.arange(self.model.sectors)[:, None] * self.size + own).ravel())
@@ -260,7 +260,7 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
 
 
 def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | float) -> Matrix:
-    """Return the shares of deviations of a sector in a wave, including the motion of the sector before times `back`."""
+    """Return the shares of a sector's deviations in a wave, with the motion of the previous sector times `back`."""
     first = np.cumsum([0, *(c.rows.shape[0] for c in changes)])
     found, next_one = shares[: first[-1]], int(first[-1])
     if next_one == shares.shape[0]:
@@ -275,7 +275,7 @@ def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | f
 
 
 def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedSector, Matrix]:
-    """Return all waves on coordinates that contacts know, and the gaps of all sectors: gaps where waves can be written in them."""
+    """Return all waves, in gap coordinates if they can be written in them, and the gaps of all sectors."""
     at, n = model.coordinates, model.sectors
     pairs = replace(model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following))
     bodies = model.places.bodies()
@@ -283,7 +283,7 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
     found = wheel_of(waves.sector, waves.kept, waves.waves, (0, 0), pairs, (shown, held))
     if not found.wheel.multipliers.size:
         return waves.with_forces(found), repeated([found.gaps], n)
-    # contacts know a dof as this sector's and as a neighbour's: sectors of a whole wheel need no copies
+    # a contact dof belongs to this sector and to a neighbour: the sectors of a whole wheel need no copies
     own = {k: structure for k, (structure, _) in waves.waves.items()}
     size = own[0].n
     same = scipy.sparse.eye_array(size, format="csr")
@@ -294,7 +294,10 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
 
 
 def _shifted_gaps(waves: SectorWaves, pairs: Pairs, size: int) -> Matrix:
-    """Return the gaps of all sectors from their coordinates: of each contact from this sector, the next one and the one after it."""
+    """Return the gaps of all sectors from their coordinates.
+
+    Each contact acts on this sector, the next one and the one after it.
+    """
     sector = waves.sector
     place = np.searchsorted(sector.independent, waves.kept)
     tie = sector.tie[:, : sector.independent.size][:, place]
@@ -380,7 +383,7 @@ def changed(law: ContactLaw, key: str, one: ContactMistuning, value: float) -> C
 
 
 def _dofs(sector: CyclicSector, own: Dofs) -> Dofs:
-    """Return the table of all sectors: ``part[n]``, positions turned."""
+    """Return the table of all sectors: ``part[n]``, with rotated positions."""
     n, axis = sector.sectors, sector.axis
     position = np.tile(own.position, (n, 1, 1))
     placed = np.flatnonzero(np.isfinite(own.position).all(axis=1))

@@ -1,4 +1,4 @@
-"""Mistuning: frequencies of blades, contacts, and parts that differ from sector to sector."""
+"""Mistuning: blades' frequencies, contacts, and parts that differ from sector to sector."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from stickslip.model.part import Part
 
 Distribution = Literal["normal", "uniform"]
 ContactQuantity = Literal["friction_coefficient", "slip_limit", "stiffness", "preload", "gap"]
-LARGEST = 0.5  # relative deviation of a frequency or a stiffness; beyond, a blade is another blade
+LARGEST = 0.5  # relative deviation of a frequency or a stiffness, above which the blade is not the same blade
 
 
 def pattern(sectors: int, distribution: Distribution, standard_deviation: float, seed: int) -> FloatArray:
@@ -38,10 +38,11 @@ def pattern(sectors: int, distribution: Distribution, standard_deviation: float,
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BladeMistuning:
-    """Blades whose natural frequencies differ while their shapes stay.
+    """Blades with deviating natural frequencies and unchanged shapes.
 
-    The deviation changes the stiffness of the blade fixed at its boundary with the rest of the part and with its neighbours. The static
-    deformation by that boundary stays the same, and all frequencies of the blade alone change by the deviation.
+    The deviation changes the stiffness of the blade fixed at its boundary with the rest of the part and with its
+    neighbours. Static deformations by this boundary are unchanged, and all frequencies of the blade alone change by the
+    deviation.
 
     Parameters
     ----------
@@ -50,8 +51,8 @@ class BladeMistuning:
     deviations
         (n_s,) relative deviation of each blade, sector 0 first; or (n_s, r) of each of its lowest r modes.
     modes
-        None: the deviation acts on every deformation of the blade (nominal-mode subspace). A number: it acts on so many of its lowest
-        modes (component-mode subspace).
+        None: the deviation acts on every deformation of the blade (nominal-mode subspace). A number: it acts on this
+        number of its lowest modes (component-mode subspace).
     quantity
         Deviating quantity: ``frequency`` or ``stiffness``.
     beyond_radius
@@ -183,7 +184,7 @@ class Mistuning:
         return found | {name + gap * (one.quantity == "gap"): one.values for name, one in self.contacts.items()}
 
     def require(self, sectors: int) -> None:
-        """Refuse deviations of another number of blades than `sectors`, unknown sectors, and two replacements of one part."""
+        """Refuse deviations of a wrong number of blades, unknown sectors, and two replacements of one part."""
         values = {name: one.deviations for name, one in self.blades.items()}
         values |= {name: one.values for name, one in self.contacts.items()}
         for name, own in values.items():

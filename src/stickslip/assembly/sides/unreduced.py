@@ -1,4 +1,4 @@
-"""Unreduced models: when nothing is condensed, and the analyses that accept it."""
+"""Unreduced models: condition under which nothing is condensed, and refusals of analyses that need a reduced model."""
 
 import numpy as np
 import scipy.sparse
@@ -20,7 +20,10 @@ INSTEAD = "take [forced_response], which solves for all dofs"
 
 
 def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
-    """Return an unreduced structure with too many dofs for condensation as `Unreduced`; `gaps` (3 p, n) are those of its contacts."""
+    """Return an unreduced structure as `Unreduced` if it has too many dofs for condensation.
+
+    `gaps` (3 p, n) are its contacts' gaps.
+    """
     if structure.is_complex or not scipy.sparse.issparse(structure.stiffness):
         return structure
     interior = structure.n - np.unique(gaps.nonzero()[1]).size
@@ -28,13 +31,13 @@ def as_it_is(structure: Structure, gaps: Matrix) -> LinearSide:
 
 
 def kept_whole(model: Model) -> int:
-    """Return about how many dofs an uncondensed model has, before it is assembled; 0 for a model that is condensed."""
+    """Return the approximate number of dofs of an uncondensed model before it is assembled; 0 for a condensed one."""
     dofs, interior = _dofs(model)
     return dofs if interior > LARGEST_INTERIOR else 0
 
 
 def _dofs(model: Model) -> tuple[int, int]:
-    """Return the number of dofs of unreduced parts, and how many of these touch no contact."""
+    """Return the number of dofs of unreduced parts, and the number of these that touch no contact."""
     if model.neighbours is not None:
         return 0, 0
     whole = [
@@ -83,7 +86,7 @@ def refuse_whole(analysis: str, model: Model, instead: str = INSTEAD) -> None:
 
 
 def unreduced_line(model: Assembled) -> tuple[str, ...]:
-    """Return a line about the solution of an uncondensed model; nothing for a condensed one."""
+    """Return a line about the solution of an uncondensed model; empty for a condensed one."""
     if model.system.structure.reduced:
         return ()
     text = (

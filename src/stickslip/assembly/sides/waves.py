@@ -1,4 +1,4 @@
-"""A sector reduced wave by wave; known waves come from memory or the store."""
+"""A sector reduced wave by wave; known waves are taken from memory or the store."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,8 +45,8 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.tuned import conjugate
 from stickslip.reduction.whole_wheel import goes_both_ways
 
-REMEMBERED = 64  # waves kept in memory
-MODES_REMEMBERED = 24  # modes of waves at other speeds kept in memory
+REMEMBERED = 64  # cached waves
+MODES_REMEMBERED = 24  # cached sets of modes of waves at other speeds
 
 
 def reduced_sector(
@@ -67,7 +67,7 @@ def reduced_sector(
     order
         Engine order and highest harmonic.
     kept, stay
-        Dofs of all parts that stay physical, and those that must each be a coordinate: outputs, rigid bodies.
+        Dofs of all parts that stay physical, and those that must be coordinates: outputs, rigid bodies.
     store
         As in `assemble`.
     more
@@ -112,7 +112,7 @@ class SectorWaves:
     bases: Mapping[int, Matrix] = field(default_factory=dict)
 
     def with_forces(self, found: ReducedSector) -> ReducedSector:
-        """Return the waves in other coordinates with the aerodynamic forces and the pressure fields on them."""
+        """Return the waves in other coordinates, with their aerodynamic forces and pressure fields."""
         spread = {k: found.ways[k].conj().T @ own for k, own in self.fields.items()}
         found = replace(found, fields=spread, bases=self.bases)
         if not self.forces:
@@ -142,7 +142,8 @@ def sector_waves(
     store
         As in `assemble`.
     rows
-        (r, N) CSR operator on the dofs of all parts. Each row adds a load, as a column after that of steady rotation.
+        (r, N) CSR operator on the dofs of all parts. Each row adds a load, as a column after the load of steady
+        rotation.
     flow
         Aerodynamic force on the model; None without a fluid.
     """
@@ -197,7 +198,7 @@ def sector_waves(
     waves = {k: wave(k, reduction) for k in numbers}
     most = max(structure.n for structure, _ in waves.values())
     if reduction is not None and any(structure.n < most for structure, _ in waves.values()):
-        # all waves have the coordinates of the one that needs most
+        # all waves get as many coordinates as the wave that needs most
         alike = replace(reduction, n_modes=most - kept.size)
         waves = {k: wave(k, alike) for k in numbers}
     bases = {k: own.basis for k, (own, _) in waves.items()}
@@ -209,7 +210,7 @@ def sector_waves(
 def _remembered(
     memo: dict[Any, Any], key: str, store: Store, make: Callable[[], tuple[Structure, Matrix]]
 ) -> tuple[Structure, Matrix]:
-    """Return a wave, from memory where it is there; ways back are large, and not remembered."""
+    """Return a wave, from memory if it is cached; waves with maps to all dofs are large, and not cached."""
     if store is with_ways_back:
         return make()
     if key not in memo:
@@ -227,7 +228,10 @@ def _spread(model: Model) -> FloatArray:
 
 
 def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, spread: FloatArray, k: int) -> tuple[Matrix, str]:
-    """Return loads with the patterns of the aerodynamic force on a wave and the spread loads behind them, and what tells these apart."""
+    """Return loads, followed by force patterns of the fluid and spread loads on a wave.
+
+    Also return a hash of patterns and spread loads.
+    """
     if flow is None and not spread.size:
         return loads, ""
     patterns = at.load(spread if flow is None else np.hstack([flow.patterns(k), spread]))
@@ -241,7 +245,10 @@ def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, spread: FloatArr
 def _parted(
     waves: Mapping[int, tuple[Structure, Matrix]], flow: Flow | None, spread: int, *, alone: bool
 ) -> tuple[Mapping[int, tuple[Structure, Matrix]], dict[int, Feedback], dict[int, Matrix]]:
-    """Return waves with their loads, of one load `alone` a row, and the aerodynamic forces and spread loads that stood behind these."""
+    """Separate the columns of `_columns`: return waves with their loads, aerodynamic forces, and spread loads.
+
+    With `alone`, a single load becomes one row.
+    """
     felt = 0 if flow is None else flow.influence.patterns
     if not felt + spread:
         return waves, {}, {}
@@ -262,7 +269,7 @@ def _dense(matrix: Matrix) -> Matrix:
 
 
 def _content_of(model: Model, like: Sequence[Spin], wheel: Sequence[Any], kept: IntArray) -> str:
-    """Return the inputs of the modes at other speeds as text; empty without such modes."""
+    """Return a hash of the inputs of the modes at other speeds; empty without such modes."""
     if not like:
         return ""
     parts = [part.structure for part in model.parts.values()]
@@ -271,7 +278,7 @@ def _content_of(model: Model, like: Sequence[Spin], wheel: Sequence[Any], kept: 
 
 
 def _sector_at_speed(model: Model, spin: Spin) -> tuple[Structure, FloatArray]:
-    """Return all parts side by side at a speed, damped, and the load of steady rotation on them."""
+    """Return all parts together at a speed, damped, and the load of steady rotation on them."""
     rest = model.steady
     own: dict[str, Structure] = {}
     steady = []
@@ -283,12 +290,12 @@ def _sector_at_speed(model: Model, spin: Spin) -> tuple[Structure, FloatArray]:
 
 
 def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts | None, IntArray]:
-    """Return how all waves are reduced and damped by their modes, and the dofs of parts that are not reduced.
+    """Return the reduction and the modal damping of all waves, and the dofs of parts that are not reduced.
 
     Raises
     ------
     InputError
-        If parts are to be reduced in different ways: a wave goes through all of them.
+        If parts have different reductions, since a wave is reduced as a whole.
     """
     bodies = {name: part for name, part in model.parts.items() if part.body is None}
     ways = {name: part.reduction for name, part in bodies.items() if part.reduction is not None}
@@ -302,7 +309,7 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts
 
 
 def _one_of(ways: Mapping[str, Any]) -> Reduction:
-    """Return the reduction of all parts together: numbers of modes add up, anything else must be alike."""
+    """Return the reduction of all parts together: numbers of modes add up, everything else must be the same."""
     for name, way in ways.items():
         if not isinstance(way, Reduction):
             raise input_error(

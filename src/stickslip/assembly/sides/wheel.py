@@ -1,4 +1,4 @@
-"""Wheels of a model: how a sector's parts meet their neighbours, its waves reduced and damped, and stages coupled at their flanges."""
+"""Wheels of a model: cyclic faces between sectors, reduced and damped waves, and stages coupled at their flanges."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,13 +25,13 @@ from stickslip.reduction.speed_basis import modes_of, on_modes_of_others
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 
-IN_SPACE = 2  # directions in which a node moves; fewer: coordinates that no turn changes
-JOINED = 1e-12  # of the largest entry: what leads from part to part
+IN_SPACE = 2  # directions in which a node must move at least; otherwise coordinates do not rotate
+JOINED = 1e-12  # relative to the largest entry: smaller entries couple no parts
 
 
 @dataclass(frozen=True)
 class DampingOfParts:
-    """Modal damping of parts that are connected by contacts only.
+    """Modal damping of parts that only contacts connect.
 
     Parameters
     ----------
@@ -91,7 +91,10 @@ class Neighbours:
     warnings: tuple[str, ...]
 
     def sector(self, structure: Structure, at: Coordinates) -> CyclicSector:
-        """Return the cyclic sector of a structure; its coordinates include both partners of a pair of dofs, or neither."""
+        """Return the cyclic sector of a structure.
+
+        Its coordinates must include both partners of a pair of dofs, or neither.
+        """
         untied = np.full(max(int(at.ids.max(initial=-1)), *self.low, *self.high, 0) + 1, -1)
         known = at.stays[at.ids[at.stays] >= 0]
         untied[at.ids[known]] = np.flatnonzero(at.ids[at.stays] >= 0)
@@ -115,7 +118,7 @@ class Neighbours:
 
 
 def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
-    """Pair the cyclic faces of all parts; None where the model is no sector.
+    """Pair the cyclic faces of all parts; None if the model is not a sector.
 
     Raises
     ------
@@ -146,12 +149,12 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
 
 
 def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
-    """Return the cyclic faces together with the ties of joins from sector to sector."""
+    """Return the cyclic faces together with the ties of joins to the next sector."""
     if found is None or not ties.high.size:
         return found
     both = (found.low, found.high, found.weights), (ties.low, ties.high, ties.onward)
     low, high, weights = _one_after_the_other(both)
-    first = np.sort(np.unique(high, return_index=True)[1])  # corners of faces that meet
+    first = np.sort(np.unique(high, return_index=True)[1])  # corners at which faces meet
     low = low if weights is not None else low[first]
     weights = None if weights is None else weights[first]
     return replace(found, low=low, high=high[first], weights=weights)
@@ -160,7 +163,7 @@ def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
 def _one_after_the_other(
     tied: Sequence[tuple[IntArray, IntArray, Matrix | None]],
 ) -> tuple[IntArray, IntArray, Matrix | None]:
-    """Join tied dofs; with weights each dof of the low faces occurs once."""
+    """Concatenate tied dofs; with weights, each dof of the low faces occurs once."""
     low, high = stacked(one[0] for one in tied), stacked(one[1] for one in tied)
     if all(one[2] is None for one in tied):
         return low, high, None
@@ -212,7 +215,10 @@ def _in_space(structure: Structure, members: IntArray) -> bool:
 
 
 def partners(sector: CyclicSector) -> IntArray:
-    """Return all dofs of a sector, with those of the high face replaced by their partners on the low face; -1 for several partners."""
+    """Return all dofs of a sector, with dofs of the high face replaced by their partners on the low face.
+
+    -1 for several partners.
+    """
     place = np.arange(sector.structure.n)
     high, low, weights = sector.following
     place[high] = -1
@@ -222,7 +228,10 @@ def partners(sector: CyclicSector) -> IntArray:
 
 
 def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
-    """Return the independent dofs behind `dofs` of a sector, in rising order: the dofs themselves, or their partners on the low face."""
+    """Return the independent dofs for `dofs` of a sector, in ascending order.
+
+    They are the dofs themselves, or their partners on the low face.
+    """
     high, low, weights = sector.following
     followed = weights[np.isin(high, dofs)].nonzero()[1]
     return np.union1d(np.setdiff1d(dofs, high), low[followed])
@@ -240,7 +249,7 @@ def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix
 
 @dataclass(frozen=True, eq=False)
 class ReducedSector:
-    """Reduced waves of a wheel, on coordinates with the same gaps in every wave.
+    """Reduced waves of a wheel, in coordinates with the same gaps for every wave.
 
     Parameters
     ----------
@@ -326,8 +335,8 @@ def reduced_wave(
 ) -> tuple[Structure, Matrix]:
     """Return a reduced wave, whose first coordinates are the kept dofs, and the loads of steady rotation on it.
 
-    `how` has the reduction and the modal damping; None: no reduction, no damping. Modal coordinates follow the modes at the
-    reference speeds, see `on_modes_of_others`.
+    `how` has the reduction and the modal damping; None: no reduction, no damping. Modal coordinates follow the modes at
+    the reference speeds, see `on_modes_of_others`.
     """
     moving = _with_way_back(sector, kept, k, how, others)
     load = moving.project(steady)
@@ -366,7 +375,7 @@ def _in_order(structure: Structure, order: IntArray) -> Structure:
 
 
 def wave_numbers(sectors: int, engine_order: int, harmonics: int) -> list[int]:
-    """Return the wave numbers of all harmonics, in rising order."""
+    """Return the wave numbers of all harmonics, in ascending order."""
     return sorted({excited_wave(engine_order, sectors, h) for h in range(harmonics + 1)})
 
 
@@ -378,7 +387,9 @@ def wheel_of(
     pairs: Pairs,
     stay: tuple[IntArray, IntArray],
 ) -> ReducedSector:
-    """Combine reduced waves to a wheel. Gaps become coordinates where they are independent and act on no dof of `stay`.
+    """Combine reduced waves to a wheel.
+
+    Gaps become coordinates if they are independent and act on no dof of `stay`.
 
     Parameters
     ----------
@@ -411,7 +422,7 @@ def wheel_of(
     hidden = bool(np.isin(gaps.indices, np.flatnonzero(stays)).any())
     fewer = np.count_nonzero(np.diff(moved.indptr)) < touched.size
     if touched.size and (fewer or not hidden) and not nodal.multipliers.size:
-        # the gaps, less what has to stay adds to them, are the same combinations in all waves, and so is what is beside them
+        # without the contribution of `stay`, gaps and remaining coordinates are the same combinations in all waves
         plain = {k: replace(structure, basis=None) for k, structure in written.items()}
         try:
             small = {k: in_relative_coordinates(s, moved, pairs.names) for k, s in plain.items()}
@@ -449,7 +460,7 @@ def is_staged(joins: Mapping[str, Join]) -> bool:
 
 
 def stages_of(places: Places, joins: Mapping[str, Join], contacts: Collection[str], speed: float) -> Multistage | None:
-    """Return the wheels of a model whose joins couple several; None for a model of one wheel.
+    """Return the wheels of a model whose joins couple several wheels; None for a model with one wheel.
 
     Parameters
     ----------
@@ -463,7 +474,7 @@ def stages_of(places: Places, joins: Mapping[str, Join], contacts: Collection[st
     Raises
     ------
     InputError
-        If the parts have other joins or contacts, a part is no sector or has no flange, or the flanges do not fit.
+        If the parts have other joins or contacts, a part is not a sector or has no flange, or the flanges do not fit.
     """
     if not is_staged(joins):
         return None

@@ -1,4 +1,4 @@
-"""Modes of a wheel whose sectors differ, its contacts open, stuck or as the static loads leave them."""
+"""Modes of a mistuned wheel with contacts open, stuck, or in the static state."""
 
 from dataclasses import dataclass, replace
 
@@ -58,7 +58,7 @@ def wheel_modes(model: Model, number: int, contacts: ContactsAs = "static", stor
 
 
 def wheel_in_flow(model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory) -> ComplexArray:
-    """Return the eigenvalues (r,), 1/s, of the lowest modes of a mistuned wheel in a flow, with its damping; least damped first.
+    """Return the eigenvalues (r,), 1/s, of the lowest modes of a damped, mistuned wheel in a flow, least damped first.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def wheel_in_flow(model: Model, number: int, contacts: ContactsAs = "static", st
 
 
 def _bound(model: Model, contacts: ContactsAs, store: Store) -> tuple[AllSectors, Structure]:
-    """Return all sectors, and their matrices with the springs of contacts that hold."""
+    """Return all sectors, and their matrices with springs at sticking contacts."""
     labels = output_labels(model.places, model.outputs, model.loads)
     none = Asked(None, {}, {}, labels, (), NO_PLACES)
     wheel = all_sectors(model, none, store)
