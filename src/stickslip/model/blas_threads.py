@@ -17,7 +17,7 @@ from threading import Lock
 from typing import Any, TypeVar, cast
 
 BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-SAID = any(name in os.environ for name in BLAS_THREADS)  # by the user: later values are set by this package
+SAID = any(name in os.environ for name in BLAS_THREADS)  # set by the user; later values come from this package
 # folders of OpenBLAS in the wheels of NumPy and SciPy, and the names of its functions there
 FOLDERS = ("{0}.libs", "{0}/.dylibs")
 NAMES = ("scipy_openblas_{0}_num_threads64_", "scipy_openblas_{0}_num_threads")

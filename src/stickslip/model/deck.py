@@ -31,7 +31,7 @@ class CalculixRun:
         First and last nodal diameter of a cyclic model; None: all.
     speed
         Rotor speed in rad/s. With a speed, a linear static step under the centrifugal load precedes; its displacements
-        are printed, and the frequencies are those of the loaded structure.
+        are printed, and the frequencies belong to the loaded structure.
     matrices
         Write stiffness and mass to files (``.sti``, ``.mas``, ``.dof``) instead of computing frequencies.
 

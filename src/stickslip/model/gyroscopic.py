@@ -15,7 +15,7 @@ from stickslip.model.modes import Factors, connected_parts, lowest_modes, normal
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
-SPARE_MODES = 10  # modes beyond twice as many as are asked for
+SPARE_MODES = 10  # modes of the basis beyond twice the requested number
 RIGID_SQUARE = 1e-12  # fraction of the largest square: a negative square nearer to zero belongs to a rigid motion
 STILL = 1e-9  # fraction of the largest rate: a smaller frequency is rounding, and the motion grows or decays without oscillation
 KNOWN = 1e-8  # fraction of a static response outside the span of the modes; less is rounding

@@ -236,7 +236,7 @@ def lowest_modes(
     Raises
     ------
     InputError
-        If fewer than `n` motions have mass; only dense algebra detects this.
+        If fewer than `n` motions have mass.
     """
     if solve is None or _small(stiffness, n):
         K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))

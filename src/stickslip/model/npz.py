@@ -33,7 +33,7 @@ BROKEN = "The file is damaged or was cut short: write or copy it again."
 
 
 def require_no_pipe(path: Path) -> None:
-    """Refuse named pipes, sockets and devices, on which a reader would wait for ever.
+    """Refuse named pipes, sockets and devices, from which reading would never end.
 
     Raises
     ------

@@ -148,9 +148,9 @@ class Part:
     surfaces
         Named points of a rigid body.
     drawn
-        Surface of a rigid body in pictures; None where nothing is known of its shape.
+        Surface of a rigid body in pictures; None if its shape is unknown.
     sectors
-        Number of sectors of the wheel of which the part is one sector; 1: no cyclic symmetry.
+        Number of sectors of the wheel, if the part is one of its sectors; 1: no cyclic symmetry.
     faces
         Names of the sets of the low and the high cyclic face.
     cyclic

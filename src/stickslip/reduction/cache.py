@@ -46,7 +46,7 @@ def cached(
     Raises
     ------
     InputError
-        If the function has no name of its own, or an argument is of a kind that is not listed above.
+        If the function is not a named function of a module, or an argument has another type than those above.
 
     Notes
     -----

@@ -223,7 +223,7 @@ def _one_missing(here: Face, there: Face, i: int, distance: float, nearest: int)
 
 
 def _angle_between(low: Face, high: Face, axis: Axis) -> float:
-    """Return the angle about the axis, in rad, between the mean positions of the two faces."""
+    """Return the angle about the axis, in rad, from the mean position of one face to the mean position of the other."""
     if not (len(low.node) and len(high.node)):
         return 0.0
     a, b = (axis.arm(low.position.mean(axis=0)[None])[0], axis.arm(high.position.mean(axis=0)[None])[0])

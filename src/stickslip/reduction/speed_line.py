@@ -1,8 +1,8 @@
 """A structure along an engine-order line: matrices and static load follow the speed.
 
 Matrices at a few speeds, on the same coordinates, are interpolated by polynomials in the square of the speed, times the speed for
-Coriolis forces. For solids this is exact: their matrices are such polynomials of second degree, their load of third. For
-modal coordinates of a reduction the interpolation converges as fast as the modes change smoothly with the speed.
+Coriolis forces. For solids this is exact: their matrices are such polynomials of second degree, their load of third. With modal
+coordinates of a reduction the interpolation converges faster, the more smoothly the modes change with the speed.
 """
 
 from dataclasses import dataclass, field, replace
@@ -111,7 +111,7 @@ class SpeedLine:
 
     @property
     def wheel(self) -> None:
-        """None: the wheel depends on the frequency (see `LinearSide`)."""
+        """None, even if the sides are tuned wheels (see `LinearSide`)."""
         return None
 
     @property

@@ -184,13 +184,13 @@ def tuned_wheel(  # noqa: PLR0913
         Two operators (3 n_contacts, n) on the displacements of a sector in its own axes: ``gap = own u^(0) + next u^(1)``,
         rows t, w, n of each contact. The second is None for contacts inside a sector; see `stickslip.contact.neighbours`.
     keep
-        (k,) dofs of the sector that stay physical in the reduction, including those of the contacts and none of the high
+        (k,) dofs of the sector that stay physical in the reduction, with the dofs of all contacts and without dofs of the high
         face; None: nothing is reduced.
     n_modes
         Number of modes of each wave in addition to the kept dofs.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
-        dofs `keep` of the wave, as many coordinates in every wave.
+        dofs `keep` of the wave, with the same number of coordinates for every wave.
     names
         Names of the contacts.
     relative

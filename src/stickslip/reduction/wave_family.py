@@ -23,7 +23,7 @@ from stickslip.reduction.basis import is_hermitian
 from stickslip.reduction.waves import wave
 
 MIN_SHARED_DOFS = 20_000  # with fewer dofs each wave is factorised alone, which takes about a second
-ROUNDING_OF_TERMS = 1e-12  # entry over the terms of which it is the difference: less is rounding
+ROUNDING_OF_TERMS = 1e-12  # difference of entries over these entries: less is rounding
 ALIKE = 1e-14  # largest difference of two equal matrices, scaled by the diagonal
 
 
@@ -38,7 +38,7 @@ class SharedInterior:
     parts
         A_0 and A_1 in CSR.
     coupling
-        (m,) dofs of the neighbour that couple with the sector: columns of A_1.
+        (m,) dofs that couple with the sector behind: columns of A_1.
     factors
         Factors of all other dofs, with the Schur complement on `coupling` and its copies.
     """

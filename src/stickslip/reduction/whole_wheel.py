@@ -136,7 +136,7 @@ def reduced_wheel(
         Number of modes kept for every wave number, which is also the number of modal coordinates of every sector.
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
-        dofs `keep` of the wave, as many coordinates in every wave.
+        dofs `keep` of the wave, with the same number of coordinates for every wave.
     feedback
         Function from a wave number and the reduced wave to the aerodynamic force on it, whose frozen form is added; None: no force.
         The forces on waves k and n_s − k must be conjugates (`Feedback.conjugate`).

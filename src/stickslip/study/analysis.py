@@ -100,7 +100,7 @@ class Solved:
     records
         Records in the order of solution.
     notes
-        Named arrays, numbers and texts that the job stored beside its records (`Notes.put`).
+        Named arrays, numbers and texts that the job stored in addition to its records (`Notes.put`).
     """
 
     case: Case

@@ -188,7 +188,7 @@ def _separator(graph: Matrix, inside: BoolArray) -> BoolArray:
     left, row = np.unique(source, return_inverse=True)
     right, column = np.unique(target, return_inverse=True)
     edges = scipy.sparse.csr_array((np.ones(row.size), (row, column)), shape=(left.size, right.size))
-    match = scipy.sparse.csgraph.maximum_bipartite_matching(edges, perm_type="column")  # of each left vertex
+    match = scipy.sparse.csgraph.maximum_bipartite_matching(edges, perm_type="column")  # partner of each left vertex
     partner = np.full(right.size, -1)
     partner[match[match >= 0]] = np.flatnonzero(match >= 0)
     # Kőnig's theorem: the vertices that alternating paths from unmatched left vertices reach

@@ -176,7 +176,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
     if chosen == "dense":
         whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
         whole = (whole + whole.conj().T) / 2  # makes the diagonal exactly real
-        blocks = scipy.linalg.ldl(whole, hermitian=True)[1]  # of one or two rows
+        blocks = scipy.linalg.ldl(whole, hermitian=True)[1]  # diagonal blocks of one or two rows
         beside = np.abs(np.diag(blocks, -1))
         signs = scipy.linalg.eigvalsh_tridiagonal(np.diag(blocks).real, beside)
         return int(np.count_nonzero(signs < 0))

@@ -46,8 +46,8 @@ def lanczos(mass: Matrix, n: int, solve: Solve, shift: float, kind: type) -> tup
     Notes
     -----
     The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks. The start block is
-    multiplied by this operator, which removes motions without mass. A Krylov space contains at most as many vectors of one eigenvalue as a block has.
-    Therefore new random directions are added after convergence, until they give no new eigenvalue.
+    multiplied by this operator, which removes motions without mass. Of a repeated eigenvalue a Krylov space contains at most as
+    many vectors as a block has. Therefore random directions are added after convergence, until they give no new eigenvalue.
     """
     size = mass.shape[0]
     random = np.random.default_rng(0)  # the same in every run

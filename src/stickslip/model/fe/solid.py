@@ -111,7 +111,7 @@ def support(
     Returns
     -------
     tuple[Structure, IntArray]
-        The structure, and the position (n,) of each of its dofs among those of the free body.
+        The structure, and the index (n,) of each of its dofs in the free body.
     """
     still = _clamped_nodes(mesh, clamped)
     fixed = np.repeat(still[:, None], 3, axis=1)

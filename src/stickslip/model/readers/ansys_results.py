@@ -34,8 +34,8 @@ class AnsysResults:
     harmonic_indices
         (k,) nodal diameters of a cyclic analysis, the second mode of a pair negative; all zero for other analyses.
     sectors
-        Number of sectors of a cyclic analysis, else 1. With sectors, the shapes belong to the modelled sector and are real as
-        in the file: the two modes of a pair are the real and the imaginary part of a travelling wave.
+        Number of sectors of a cyclic analysis, else 1. In a cyclic analysis the shapes belong to the modelled sector and are
+        real as in the file: the two modes of a pair are the real and the imaginary part of a travelling wave.
     """
 
     frequencies_hz: FloatArray
@@ -58,7 +58,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     Raises
     ------
     InputError
-        If the file is damaged, of another kind or analysis, only one of several files, or contains complex modes.
+        If the file is damaged, of another kind or analysis, one part of a distributed analysis, or contains complex modes.
     """
     units = Units.si() if units is None else units
     file = open_records(path, RESULT)
@@ -98,7 +98,7 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
 
 
 def _modal(file: Records, header: IntArray) -> None:
-    """Refuse result files that are incomplete or not of a modal analysis."""
+    """Refuse parts of distributed analyses, and analyses that are not modal."""
     if header[7] != MODAL:
         raise input_error(
             str(file.path),

@@ -21,7 +21,7 @@ WIDTHS = {0: 5, 1: 10}  # characters of a node number in the short and the long 
 VALUE = 12  # characters of a value
 PER_LINE = 6  # values on a line
 MODAL = 2  # kind of a result: 0 static, 1 time step, 2 frequency, 3 load step
-RESPONSE = "RESPONSE"  # text of a block with a forced response instead of a mode shape
+RESPONSE = "RESPONSE"  # text of a block with a motion in m instead of a mode shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ class _Frd:
         return found
 
     def _spoiled(self, block: Sequence[str], first: int, width: int) -> InputError:
-        """Return the error that names the line with something else than a number."""
+        """Return the error that names the line with an invalid number."""
         for i, line in enumerate(block):
             rest = line[3 + width :].rstrip()
             fields = [line[3 : 3 + width].strip() or "0"]

@@ -142,7 +142,7 @@ class Harmonics(Section):
 
     @property
     def own_strategy(self) -> Any:
-        """The strategy of the user; None for a built-in one."""
+        """The user's strategy; None for a built-in one."""
         if is_address(self.selection):
             return made(of_address(self.selection), self.selection)
         return None if isinstance(self.selection, str) else self.selection

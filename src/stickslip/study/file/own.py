@@ -1,4 +1,4 @@
-"""Objects of the user in the tables of a study file."""
+"""Objects of the user's code in the tables of a study file."""
 
 from collections.abc import Sequence
 from typing import Any

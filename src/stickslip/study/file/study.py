@@ -49,7 +49,7 @@ class StudyFile:
     cases
         Cases of [vary]; one case without it.
     code
-        Code of the user that the file names.
+        User's code that the file names.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""All tables of a study file, including those of the analyses."""
+"""All tables of a study file, including the tables of the analyses."""
 
 import json
 from functools import cache

@@ -296,7 +296,7 @@ def _solid(
 
 
 def _from_own_reader(key: str, table: FileModel, home: Path, material: Material | None, others: dict[str, Any]) -> Part:
-    """Read a part by a function of the user."""
+    """Read a part with the user's function."""
     place = f"{key}.reader"
     found = called(str(table.reader), place, home / table.file, units=_units(table))
     refuse_other_models(place, str(table.reader), found)

@@ -137,7 +137,7 @@ class OtherModel:
     raw
         Content of the file with the values of the case.
     code
-        Code of the user that the file names.
+        User's code that the file names.
     memo
         Built parts; empty in another process.
     """

@@ -50,14 +50,14 @@ def unwritable_database(path: Path, error: sqlite3.Error) -> InputError | None:
 
 
 def beside(name: str, mark: str = "*") -> str:
-    """Return the temporary name of a file while it is written; it keeps the suffix, because libraries go by it.
+    """Return the temporary name of a file while it is written, with the same suffix, which libraries evaluate.
 
     Parameters
     ----------
     name
         Final name.
     mark
-        Mark of the writing process; left out: the pattern that matches all processes.
+        Mark of the writing process; the default is a pattern that matches all processes.
     """
     path = Path(name)
     return str(path.with_name(f"{path.stem}.{mark}.part{path.suffix}"))

@@ -25,7 +25,7 @@ def _point(given: Any) -> Any:
 
 
 class AeroTable(Section):
-    """Aerodynamic influence coefficients: forces on a blade from its own motion and that of its neighbours."""
+    """Aerodynamic influence coefficients: forces on a blade from its own motion and its neighbours'."""
 
     file: FilePath = Field(
         description="CSV or TOML file of the coefficients, relative to the study: a column neighbour, recorded_on, wave_number or "
