@@ -1,7 +1,7 @@
-"""Motions without a period, in time: envelope, statistics, spectrum, and whether these have settled.
+"""Motions without a period, in time: envelope, statistics and spectrum, and the test whether they have settled.
 
-A motion that repeats itself never has no amplitude, but windows of it are alike once it has settled: the largest amplitude in a window, its mean
-and root mean square. The march is as long as that needs, or as a budget of work allows; of what it was, the later half counts.
+A motion that never repeats has no amplitude, but once settled, its windows agree in largest amplitude, mean and root mean square. The integration
+continues until they do, or until a budget of work is spent. Only the second half counts.
 """
 
 from dataclasses import dataclass, replace
@@ -20,21 +20,21 @@ from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.stepping.marcher import FINE, prepared, with_enough_steps
 from stickslip.response.time.transient import TimeStepping, integrate
 
-KEPT = 32  # samples of a period that are kept
-WINDOWS = 4  # of the later half, which are compared
+KEPT = 32  # stored samples in a period
+WINDOWS = 4  # compared windows of the second half
 MIN_PERIODS, MAX_PERIODS = 128, 2048  # periods
-ALIKE = 0.02  # relative spread between windows that counts as none
-WORK = 8e10  # floating point operations of a march, 20 s of them as a rule
-PEAKS = 6  # of a spectrum that are told
-FAINT = 1e-3  # of the largest peak: what is below is not told
-FEW_STEPS = 256  # in a period of the faster frequency, where a balance is compared
-SHORT = 40  # turns of the first phase that two loads may take to repeat themselves in a comparison
-LONG = 20  # such repetitions at most
+ALIKE = 0.02  # relative spread between settled windows
+WORK = 8e10  # floating-point operations of an integration, usually 20 s
+PEAKS = 6  # reported peaks of a spectrum
+FAINT = 1e-3  # smallest reported peak, over the largest
+FEW_STEPS = 256  # in a period of the faster frequency, for comparison with a balance
+SHORT = 40  # largest number of periods of the first load until both loads repeat, for a comparison
+LONG = 20  # largest number of such repetitions
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Time history over many periods of a reference frequency, which need not be that of the motion.
+    """Time history over many periods of a reference frequency, which may differ from the motion's frequency.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Course:
     seconds
         Computing time, s.
     steps, angle
-        Steps in a period, and phase angle per step, rad, of the fastest contact that opens or closes.
+        Steps in a period, and phase angle per step of the fastest contact that opens or closes, rad.
     """
 
     omega: float
@@ -70,7 +70,7 @@ class Course:
 
     @property
     def coarse(self) -> bool:
-        """Whether the step is too long to follow the impacts of the stiffest contact that opens."""
+        """Whether the step is too long for the impacts of the stiffest opening contact."""
         return self.angle > FINE
 
     @property
@@ -91,15 +91,15 @@ class Statistics:
     Attributes
     ----------
     largest, least
-        (outputs,) amplitude of a period, half of peak to peak: the largest and the least, m.
+        (outputs,) largest and smallest amplitude of a period, half of peak to peak, m.
     mean, rms
         (outputs,) mean, and root mean square about it, m.
     extreme
         (outputs,) largest distance from the mean, m.
     spread
-        Largest relative difference between windows of the same length, of the largest amplitude and of the root mean square.
+        Largest relative difference between windows of equal length, in largest amplitude and root mean square.
     hertz, peaks
-        (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum, NaN where there are fewer.
+        (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum; NaN if there are fewer.
     periods
         Number of periods in the second half.
     """
@@ -116,7 +116,7 @@ class Statistics:
 
     @property
     def settled(self) -> bool:
-        """Whether the statistics have settled: all windows are alike."""
+        """Whether the statistics have settled: all windows agree."""
         return self.spread <= ALIKE
 
 
@@ -134,7 +134,7 @@ def course(  # noqa: PLR0913
     least: int = MIN_PERIODS,
     most: int = MAX_PERIODS,
 ) -> Course:
-    """Integrate in time until windows of the second half are alike, or the work is spent.
+    """Integrate in time until the windows of the second half agree, or the work is spent.
 
     Parameters
     ----------
@@ -147,9 +147,9 @@ def course(  # noqa: PLR0913
     start
         State at t = 0.
     steps
-        Smallest number of steps in a period. It is doubled while contacts that open and close are too stiff for the step.
+        Smallest number of steps in a period. It is doubled while opening contacts are too stiff for the step.
     work
-        Budget of floating point operations, as counted by `step_work`, which does not depend on the load of the machine.
+        Budget of floating-point operations as counted by `step_work`, independent of the computer.
     least, most
         Smallest and largest number of periods.
     """
@@ -235,7 +235,7 @@ def _spread(windows: FloatArray) -> float:
 
 
 def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies (Hz) and amplitudes of the largest peaks of samples (n, outputs), `KEPT` a period."""
+    """Return frequencies (Hz) and amplitudes of the largest spectral peaks of samples (n, outputs), `KEPT` in a period."""
     n, outputs = samples.shape
     window = np.hanning(n)
     lines = np.abs(np.fft.rfft(samples * window[:, None], axis=0)) * (2.0 / window.sum())
@@ -255,7 +255,7 @@ def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray
 
 
 def second_tone_in_time(problem: TwoTones, motion: TorusMotion, load: HarmonicLoad) -> Statistics:
-    """Return the statistics of a motion with a self-excited second tone, integrated from the balance under the load of the first."""
+    """Return the statistics of a motion with a self-excited second tone, integrated from the balance's solution under the first load."""
     system, omega = problem.system, motion.omegas[0]
     contacts = system.interface
     start = start_from_harmonics(_folded(motion), omega / _turns(motion)[0], contacts.gap_operator, contacts.laws)
@@ -264,14 +264,14 @@ def second_tone_in_time(problem: TwoTones, motion: TorusMotion, load: HarmonicLo
 
 
 def _turns(motion: TorusMotion) -> tuple[int, int]:
-    """Return how many turns of both phases nearly close."""
+    """Return the numbers of periods of both frequencies after which the motion nearly repeats."""
     ratio = motion.omegas[1] / motion.omegas[0]
     choices = [(p, max(1, round(ratio * p))) for p in range(1, SHORT + 1)]
     return min(choices, key=lambda c: (round(abs(ratio - c[1] / c[0]), 9), c[0]))
 
 
 def _folded(motion: TorusMotion) -> ComplexArray:
-    """Return the motion as harmonics of the frequency of which both are nearly multiples."""
+    """Return the motion as harmonics of the near-common divisor of both frequencies."""
     p, q = _turns(motion)
     orders = [j * p + k * q for j, k in motion.indices]
     out = np.zeros((max(abs(h) for h in orders) + 1, motion.coefficients.shape[1]), dtype=complex)
@@ -284,25 +284,25 @@ def _folded(motion: TorusMotion) -> ComplexArray:
 def two_loads_in_time(
     problem: TwoTones, motion: TorusMotion, first: HarmonicLoad, second: HarmonicLoad
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Integrate loads in a ratio of whole numbers near that of a motion, and compare with the balance at that ratio.
+    """Integrate under loads with a rational frequency ratio near the motion's, and compare with the balance at this ratio.
 
     Parameters
     ----------
     problem, motion
-        Problem, and its motion.
+        Problem and its motion.
     first, second
-        Loads of either frequency.
+        Loads of the first and of the second frequency.
 
     Returns
     -------
     tuple or None
-        Largest and smallest amplitude (outputs,) in time, m, and the difference from the balance, root mean square over that of the
-        motion. None for loads that beat too slowly, or without a balance at the ratio.
+        Largest and smallest amplitude (outputs,) in time, m, and the root-mean-square difference from the balance, relative to the
+        vibration. None for loads that beat too slowly, or without a solution at the ratio.
     """
     p, q = _turns(motion)
     base = motion.omegas[0] / p
     if p == q:
-        return None  # they beat more slowly than is marched
+        return None  # the beat is longer than the integration
     near = problem.solve((motion.omegas[0], q * base), motion.x)
     if not near.converged:
         return None

@@ -28,18 +28,18 @@ from stickslip.solve.linear import solve_with
 from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
-LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
+LEVELS = 8  # steps of the second load if Newton's method fails at full load
 MOST_RAISES = 6
-FAINT = 0.01  # of the coordinate that moves most: the change of one that moves less counts against that
-STEP_LEAVES = 1e-4  # of that step's right side, where a Krylov method solves for it
-STEP_MORE = 40  # combined frequencies more in the Newton step that says how far off a motion is
-BEYOND = 4  # sums of harmonics above the largest, that are looked at but not taken
-SHARE = 0.5  # of the tolerance, below which together combined frequencies stay out
+FAINT = 0.01  # smallest reference for the change of a coordinate, over the largest coordinate
+STEP_LEAVES = 1e-4  # relative residual of the error-estimating step by a Krylov method
+STEP_MORE = 40  # additional combined frequencies in the Newton step that estimates the error
+BEYOND = 4  # additional order of the combined frequencies in the error estimate
+SHARE = 0.5  # of the tolerance, up to which combined frequencies are omitted
 
 
 @dataclass(frozen=True, eq=False)
 class TorusMotion:
-    """A motion with two frequencies.
+    """Motion with two frequencies.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class TorusMotion:
 
     @property
     def converged(self) -> bool:
-        """Whether it is a solution."""
+        """Whether the motion is a solution."""
         return self.status.converged and bool(np.all(np.isfinite(self.coefficients)))
 
     @property
@@ -93,7 +93,7 @@ class TorusMotion:
         return np.asarray((np.exp(1j * angles) @ self.coefficients[:, dofs]).real)
 
     def at_times(self, dofs: IntArray, times: FloatArray, phase: float = 0.0) -> FloatArray:
-        """Return the (times, len(dofs)) displacements at times (s), m; `phase` is that of the second frequency at t = 0."""
+        """Return the (times, len(dofs)) displacements at times (s), m; `phase` is the phase of the second frequency at t = 0."""
         return self.values(dofs, self.omegas[0] * times, self.omegas[1] * times + phase)
 
 
@@ -106,7 +106,7 @@ class Envelope:
     phase
         (n,) phase of the second frequency at the beginning of a cycle of the first, rad.
     amplitude
-        (n, outputs) half of peak to peak over that cycle, m.
+        (n, outputs) half of peak to peak over this cycle, m.
     rms
         (outputs,) root mean square about the mean, m.
     """
@@ -122,7 +122,7 @@ class Envelope:
 
     @property
     def least(self) -> FloatArray:
-        """(outputs,) least amplitude, m."""
+        """(outputs,) smallest amplitude, m."""
         return np.asarray(self.amplitude.min(axis=0))
 
 
@@ -146,16 +146,16 @@ class _Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class TwoTones:
-    """A system under two loads of different frequencies; `two_tones` makes one.
+    """System under two loads of different frequencies; `two_tones` makes one.
 
     Attributes
     ----------
     system
         System of structure and contacts.
     balance
-        The equations.
+        Equations of the balance.
     newton
-        Settings of Newton's method.
+        Options of Newton's method.
     """
 
     system: System
@@ -163,15 +163,15 @@ class TwoTones:
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
     def with_indices(self, indices: Indices) -> "TwoTones":
-        """Return the same with other combined frequencies."""
+        """Return the problem with other combined frequencies."""
         return replace(self, balance=self.balance.with_indices(indices))
 
     def path(self, ratio: float, refine: float = 1.0) -> TorusPath:
-        """Return how the torus is sampled."""
+        """Return the sampling path on the torus."""
         return closed_path(ratio, self.balance.order, refine)
 
     def motion(self, x: FloatArray, omegas: tuple[float, float], solution: Solution, path: TorusPath) -> TorusMotion:
-        """Return the motion of unknowns."""
+        """Return unknowns as a motion."""
         balance = self.balance
         full = balance.side.recover(balance.indices, omegas, balance.coefficients(x))
         return TorusMotion(
@@ -211,9 +211,9 @@ class TwoTones:
         omegas
             ω1 and ω2.
         start
-            Initial unknowns; None: stuck contacts, and if that fails a second load that grows from zero.
+            Initial unknowns; None: stuck contacts, and if this fails, continuation of the second load from zero.
         path
-            Sampling of the torus; None: from `path`.
+            Sampling of the torus; None: the result of the method `path`.
         """
         check_frequencies(omegas)
         path = path or self.path(omegas[1] / omegas[0])
@@ -233,7 +233,7 @@ class TwoTones:
         return newton(evaluate, x, self.newton)
 
     def _raised(self, omegas: tuple[float, float], path: TorusPath, failed: Solution) -> Solution:
-        """Raise the second load from nothing, each step begun where the line through the last two leads."""
+        """Raise the second load from zero, with linear extrapolation through the last two steps."""
         x = self._at_level(0.0).stuck(omegas)
         before: FloatArray | None = None
         solution, spent = failed, failed.iterations
@@ -273,7 +273,7 @@ def two_tones(
     system
         System of structure and contacts; a tuned wheel needs all its waves.
     first
-        The static load, and that whose harmonics are those of ω1.
+        Load with the static part and the harmonics of ω1.
     second
         Load with the harmonics of ω2; its static part is not used.
     order
@@ -281,14 +281,14 @@ def two_tones(
     waves
         Wave numbers of both frequencies on a tuned wheel. Loads are given in the coordinates of their own waves.
     more
-        Dofs that are retained beside those of the contacts.
+        Dofs retained in addition to the contact dofs.
     newton_options
-        Solver; None: as usual.
+        Solver options; None: defaults.
 
     Raises
     ------
     InputError
-        If a tuned wheel lacks waves, or `torus_balance` refuses.
+        If a tuned wheel lacks waves, or `torus_balance` refuses the input.
     """
     side = torus_side(system, first, second, order, waves, more)
     balance = torus_balance(side, system.interface, order)
@@ -328,7 +328,7 @@ def torus_side(
 
 
 def check_frequencies(omegas: tuple[float, float]) -> None:
-    """Raise `InputError` unless both frequencies are positive numbers, and not one and the same."""
+    """Raise `InputError` unless both frequencies are positive and different."""
     if not all(np.isfinite(w) and w > 0.0 for w in omegas) or omegas[0] == omegas[1]:
         raise input_error(
             "quasi_periodic",
@@ -343,26 +343,26 @@ Solving = Callable[[TwoTones, FloatArray, TorusPath], TorusMotion]
 def with_enough(
     problem: TwoTones, motion: TorusMotion, most: int, tolerance: float, solve: Solving
 ) -> tuple[TwoTones, TorusMotion]:
-    """Add combined frequencies until those left out would change the motion by less than `tolerance`.
+    """Add combined frequencies until the omitted ones would change the motion by less than `tolerance`.
 
-    Two lightly damped resonances are hit by some combined frequency of almost any order: those are taken which the contact forces move
-    most, not all up to an order.
+    The combined frequencies with the largest response to contact forces are added, not all up to an order, since almost any order has some
+    combined frequency near a lightly damped resonance.
 
     Parameters
     ----------
     problem, motion
         Initial problem and motion.
     most
-        Largest sum of harmonics that is taken; what is left out is looked for up to `BEYOND` more, and in the judging set of the loads.
+        Largest sum of harmonics. The error estimate includes sums up to `BEYOND` more, and the judging set of the loads.
     tolerance
-        Root mean square, relative.
+        Relative tolerance of the root mean square.
     solve
-        Returns the motion with other indices, from unknowns and on a path.
+        Function that solves a problem from unknowns on a path.
 
     Returns
     -------
     TwoTones, TorusMotion
-        The last that converged, `left_out` telling what is left out.
+        Last converged problem and motion; `left_out` is the estimated effect of the omitted frequencies.
     """
     side = problem.balance.side
     own_tones = [(h, 0) for h in driven_by(side.first.load)]
@@ -388,7 +388,7 @@ def with_enough(
             motion = replace(motion, left_out=max(plain, told))
             if motion.left_out <= tolerance or room(problem) < 1 or raised == MOST_RAISES:
                 break
-            stays *= plain / motion.left_out  # resonance makes more of it
+            stays *= plain / motion.left_out  # resonance amplifies the omitted frequencies
         added = order[rest > stays**2][::-1][: room(problem)]
         if not added.size:
             break
@@ -404,16 +404,16 @@ def with_enough(
 
 
 def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]) -> float:
-    """Return the change of a motion by a Newton step with more combined frequencies: ratio of root mean squares at the coordinate of the largest change.
+    """Return the relative change of a motion by a Newton step with more combined frequencies: root mean square of the most changed coordinate.
 
     Parameters
     ----------
     problem, motion
         Problem and its solved motion.
     path
-        Sampling path that is fine enough for the larger set.
+        Sampling path, fine enough for the larger set.
     more
-        Combined frequencies, those that matter most first; as many are taken as a step may have.
+        Combined frequencies by decreasing importance; the step takes as many as it can.
     """
     few = max(0, min(STEP_MORE, room(problem)))
     wider = problem.balance.with_indices((*motion.indices, *more[:few]))
@@ -433,7 +433,7 @@ def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequen
 
 
 def _with_free_tone(balance: TorusBalance, x: FloatArray, at: TorusLinearisation) -> tuple[Bordered, FloatArray]:
-    """Return a Jacobian and residual with the second frequency among the unknowns, and no step along the phase of the second tone."""
+    """Return Jacobian and residual with the second frequency as an unknown and a fixed phase of the second tone."""
     own = balance.coefficients(x)
     along = balance.unknowns(np.array([1j * k * row for (_, k), row in zip(balance.indices, own, strict=True)]))
     return Bordered(at.jac, at.by_second, along, 0.0), np.append(at.residual, 0.0)

@@ -1,10 +1,9 @@
-"""Motions with a second frequency of their own: an unstable forced motion, or flutter beside it, and the search for both.
+"""Motions with a self-excited second frequency, by instability of the forced motion or by flutter, and the search for them.
 
-Beyond a Neimark-Sacker point a second tone of an own frequency grows out of the forced motion. It has a phase that nothing fixes, since time may
-begin anywhere for it, and so its frequency is one more unknown. For a given amplitude ``a`` of the second tone, the damping that has to
-be taken away wherever it takes part to keep it going is another unknown, a *level*: small and below zero at first, at zero where the
-motion goes on by itself. The curve over ``a`` begins with the disturbance that grows, at the angle of its multiplier or the frequency of
-its mode.
+Beyond a Neimark-Sacker point a second tone with its own frequency grows out of the forced motion. Its phase is arbitrary, so its frequency is an
+additional unknown. For a given amplitude ``a`` of the second tone, another unknown is the *level*: the damping that is removed from all combined
+frequencies of the second tone to sustain it. The level is small and negative at first, and zero where the motion sustains itself. The curve over ``a``
+begins with the growing disturbance, at the angle of its multiplier or the frequency of its mode.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,27 +27,27 @@ from stickslip.response.stability import stability
 from stickslip.solve.newton_method import Solution, newton
 from stickslip.solve.status import Status
 
-FIRST = 0.02  # of the forced motion: amplitude of the second tone that the curve begins with
-STEP = 1.5  # factor of the amplitude from one point to the next
-SHORTEST, LONGEST = 1.02, 4.0  # factors below which a step is given up, and of the longest
-FEW = 3  # Newton steps after which the next step is longer
-FARTHEST = 300.0  # times the forced motion, where the curve ends
-HALVINGS = 8  # of the interval in which a level is zero
+FIRST = 0.02  # initial amplitude of the second tone, over the forced motion
+STEP = 1.5  # initial factor of the amplitude from one point to the next
+SHORTEST, LONGEST = 1.02, 4.0  # smallest and largest such factor
+FEW = 3  # Newton steps up to which the next step is longer
+FARTHEST = 300.0  # last amplitude, over the forced motion
+HALVINGS = 8  # of the interval with a zero of the level
 WANDERED = 0.3  # |ln(ω2 / guess)| at which the second tone is lost
-PATHS = 4  # times the path is chosen anew after the frequency that was found
-STILL = 1e-6  # of the motion: a second tone that is smaller is none
-REAL = 1e-6  # rad: an angle that is smaller, or nearer to π, is none of a second frequency
-ORDER = 7  # harmonics of the motion whose multipliers are looked at
-HIGHEST = 3  # harmonic beside which a frequency is looked for
-TRIED = 3  # frequencies
-# of a frequency: from how far a branch is followed to it, and how near its points may be
+PATHS = 4  # largest number of adaptations of the sampling path to the frequency
+STILL = 1e-6  # amplitude of a second tone over the motion, below which it has vanished
+REAL = 1e-6  # rad: smallest angle of a complex multiplier, from 0 and from π
+ORDER = 7  # harmonics of the motion for multipliers
+HIGHEST = 3  # highest harmonic with a second frequency near it
+TRIED = 3  # second frequencies to try
+# relative to a frequency: beginning of a branch to it, and largest distance of the branch's points
 WIDE, POINT_DISTANCE_RTOL = 0.3, 1e-3
-NARROW = 1e-6  # half width of the range about a frequency that is solved alone
+NARROW = 1e-6  # relative half-width of the range about a single frequency
 
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """A second tone at very small amplitudes.
+    """Second tone at very small amplitudes.
 
     Attributes
     ----------
@@ -65,7 +64,7 @@ class Beginning:
     defect
         Smallest over largest singular value of the linearised equations of the second tone; zero at a Neimark-Sacker point.
     share
-        Share of the second frequency itself in the shape.
+        Share of the uncombined second frequency in the shape.
     """
 
     problem: TwoTones
@@ -88,11 +87,11 @@ class ToneOfAmplitude:
     omega
         Frequency of the second tone, rad/s.
     ratio
-        Damping ratio of the second tone; below zero it grows.
+        Damping ratio of the second tone; negative if it grows.
     x
         Unknowns of the motion.
     converged
-        Whether it is a solution.
+        Whether the motion is a solution.
     """
 
     amplitude: float
@@ -111,16 +110,16 @@ class _Evaluation:
 
 @by_one_thread
 def forced_motion(problem: TwoTones, omega: float, start: ComplexArray | None = None) -> TorusMotion:
-    """Return the periodic motion under the first load alone, as a motion of two frequencies with no second tone.
+    """Return the periodic motion under the first load only, as a motion without a second tone.
 
     Parameters
     ----------
     problem
-        With all combined frequencies.
+        Problem with all combined frequencies.
     omega
         ω1, rad/s.
     start
-        (H + 1, n_retained) coefficients to begin from, m; None: contacts stuck.
+        (H + 1, n_retained) starting coefficients, m; None: stuck contacts.
     """
     indices = tuple(i for i in problem.balance.indices if i[1] == 0)
     alone = problem.with_indices(indices)
@@ -140,11 +139,11 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
     Parameters
     ----------
     problem
-        With all combined frequencies.
+        Problem with all combined frequencies.
     forced
-        From `forced_motion`.
+        Result of `forced_motion`.
     guesses
-        rad/s, above zero.
+        Positive frequencies, rad/s.
     """
     balance = problem.balance
     alone = problem.with_indices(forced.indices)
@@ -169,7 +168,7 @@ def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float])
 
 @by_one_thread
 def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
-    """Yield second tones of growing amplitude, up to the self-sustained one or to the end of the branch."""
+    """Yield second tones of growing amplitude, up to the end of the branch."""
     balance = beginning.problem.balance
     size = float(np.max(np.abs(balance.coefficients(beginning.forced)[1:])))
     amplitude, factor = FIRST * size, STEP
@@ -208,7 +207,7 @@ def second_tone(beginning: Beginning) -> TorusMotion | None:
 
 
 def _between(beginning: Beginning, below: ToneOfAmplitude, above: ToneOfAmplitude) -> TorusMotion | None:
-    """Return the motion without a level between two amplitudes, the interval halved as long as Newton's method does not find it."""
+    """Return the self-sustained motion between two amplitudes, halving the interval while Newton's method fails."""
     for _ in range(HALVINGS):
         share = below.ratio / (below.ratio - above.ratio)
         x = below.x + share * (above.x - below.x)
@@ -235,7 +234,7 @@ def _between(beginning: Beginning, below: ToneOfAmplitude, above: ToneOfAmplitud
 def solve_free(
     problem: TwoTones, x: FloatArray, omegas: tuple[float, float], path: TorusPath | None = None
 ) -> TorusMotion:
-    """Return the motion with an unknown second frequency; the phase of the second tone is that of the start.
+    """Solve for a motion with an unknown second frequency; the phase of the second tone is taken from the start.
 
     Parameters
     ----------
@@ -246,7 +245,7 @@ def solve_free(
     omegas
         ω1 and an estimate of ω2, rad/s.
     path
-        Sampling of the torus; None: from the frequencies, and once more after ω2 is known.
+        Sampling of the torus; None: chosen from the frequencies, and adapted to the solution's ω2.
     """
     balance = problem.balance
     own = balance.coefficients(x)[balance.indices.index((0, 1))]
@@ -282,13 +281,13 @@ def solve_free(
     size = float(np.max(np.abs(motion.coefficients[1:])))
     alone = [place for place, (_, k) in enumerate(motion.indices) if k != 0]
     if float(np.max(np.abs(motion.coefficients[alone]))) < STILL * size:
-        # the second tone has died: the equation of its frequency is none
+        # the second tone has vanished, so its frequency is undetermined
         return replace(motion, status=Status.SINGULAR)
     return motion
 
 
 def _of_amplitude(beginning: Beginning, y: FloatArray, amplitude: float) -> Solution:
-    """Solve for the motion, ln ω2 and the level of damping, over the amplitude of the second tone."""
+    """Solve for the motion, ln ω2 and the level of damping at an amplitude of the second tone."""
     problem = beginning.problem
     balance, (first, guess) = problem.balance, beginning.omegas
     place = _row(problem) * balance.side.n + beginning.position
@@ -322,7 +321,7 @@ def _told(beginning: Beginning, amplitude: float, solution: Solution) -> ToneOfA
 
 
 def _guess(before: tuple[float, FloatArray] | None, last: tuple[float, FloatArray], amplitude: float) -> FloatArray:
-    """Extrapolate linearly from two points; from one point the second tone alone grows in proportion to the amplitude."""
+    """Extrapolate linearly from two points; return a single point unchanged."""
     if before is None:
         return last[1]
     share = (amplitude - last[0]) / (last[0] - before[0])
@@ -330,13 +329,13 @@ def _guess(before: tuple[float, FloatArray] | None, last: tuple[float, FloatArra
 
 
 def _of_second(problem: TwoTones) -> BoolArray:
-    """Return which unknowns belong to combined frequencies that contain the second one."""
+    """Return whether each unknown belongs to a combined frequency that contains the second one."""
     rows = [k != 0 for _, k in problem.balance.indices[1:] for _ in range(2)]
     return np.repeat([False, *rows], problem.balance.side.n)
 
 
 def _turned(indices: Sequence[tuple[int, int]], motion: ComplexArray, along: complex) -> ComplexArray:
-    """Return a motion with the second phase begun where `along`, a coefficient of (0, 1), is real and positive."""
+    """Return a motion with its second phase shifted so that `along`, a coefficient of (0, 1), is real and positive."""
     angle = float(np.angle(along))
     turns = np.array([np.exp(-1j * k * angle) for _, k in indices])
     return np.asarray(turns[:, None] * motion)
@@ -348,7 +347,7 @@ def _row(problem: TwoTones) -> int:
 
 
 def _one_at(place: int, size: int) -> FloatArray:
-    """Return the derivative (size,) of one unknown by all."""
+    """Return the derivative (size,) of one unknown by all unknowns."""
     return np.asarray(np.eye(1, size, place)[0])
 
 
@@ -367,9 +366,9 @@ class Found:
     forced
         Forced motion without a second tone.
     ratio
-        Damping ratio of the last examined second tone at small amplitudes, of a growing one if there is any; NaN if none was examined.
+        Damping ratio at small amplitudes of the last examined second tone, or of a growing one if there is any; NaN if none was examined.
     near
-        Frequency near that tone, rad/s; NaN if none was examined.
+        Frequency of this tone, rad/s; NaN if none was examined.
     """
 
     motion: TorusMotion | None
@@ -408,7 +407,7 @@ def tone_beside(
         if not first.converged:
             continue
         if ratio < 0.0 and first.ratio >= 0.0:
-            continue  # one that grows has been seen: that another decays does not undo it
+            continue  # the ratio of a growing tone is kept
         ratio, near = first.ratio, first.omega
         if ratio >= 0.0:
             continue
@@ -419,7 +418,7 @@ def tone_beside(
 
 
 def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[ComplexArray]:
-    """Yield the forced motions (H + 1, n_retained), m, of a single structure at a frequency, on branches from below and from above."""
+    """Yield forced motions (H + 1, n_retained) of a single structure at a frequency, m, on branches from below and from above."""
     retained = problem.balance.side.first.retained
     ways: tuple[tuple[float, Literal["up", "down"]], ...] = ((1 - WIDE, "up"), (1 + WIDE, "down"))
     for far, direction in ways:
@@ -449,7 +448,7 @@ def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[
     Returns
     -------
     list[float], str
-        The frequencies, and why the multipliers do not prove stability; empty where they do.
+        Frequencies, and the reason why the multipliers do not prove stability; an empty string if they do.
     """
     sweep = Sweep(
         omega_range=((1.0 - NARROW) * omega, (1.0 + NARROW) * omega),
@@ -474,7 +473,7 @@ def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[
 
 
 def tones_of_multipliers(multipliers: ComplexArray, omega: float, highest: int, count: int = 1) -> list[float]:
-    """Return the possible frequencies, rad/s, of the disturbances that grow most, one beside every harmonic of the motion.
+    """Return the possible frequencies, rad/s, of the fastest growing disturbances, near every harmonic of the motion.
 
     Parameters
     ----------
@@ -505,7 +504,7 @@ def tones_of_multipliers(multipliers: ComplexArray, omega: float, highest: int, 
 
 
 def distinct(frequencies: Sequence[float], omega: float) -> list[float]:
-    """Return frequencies that are no multiples of `omega` and differ by more than a thousandth."""
+    """Return the frequencies that are no multiples of `omega` and differ by more than 0.1 %."""
     out: list[float] = []
     for one in frequencies:
         off = abs(one / omega - round(one / omega))

@@ -1,1 +1,1 @@
-"""Resonance peaks as equations: followed over design parameters, subharmonic ones among them, and the highest of several."""
+"""Resonance peaks followed over design parameters as solutions of equations, including subharmonic ones."""

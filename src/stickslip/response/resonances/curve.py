@@ -1,4 +1,4 @@
-"""The curve of a resonance over a design parameter, by arc length: round the folds at which a peak is born or joins another one."""
+"""Curve of a resonance over a design parameter by arc length, around folds at which peaks appear or merge."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,36 +20,36 @@ from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution
 
 FEW = 12  # iterations of a corrector along the curve
-SHORTEST = 0.004  # step, in arc length, below which a curve is taken up further on
-BEYOND = 0.5  # of the span by which a corrector may go beyond it
-MAX_CURVE_LENGTH = 10  # multiples of the smallest number of points at which a curve ends
+SHORTEST = 0.004  # step, in arc length, below which a curve is restarted further on
+BEYOND = 0.5  # distance of a corrector beyond the span, over the span
+MAX_CURVE_LENGTH = 10  # largest number of points, over the requested smallest number
 
 
 @by_one_thread
 def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, peak: int = 0) -> Iterator[PeakPoint]:
-    """Follow the curve of a resonance peak over a design parameter by arc length, round its folds.
+    """Follow the curve of a resonance peak over a design parameter by arc length, around its folds.
 
     Parameters
     ----------
     search
-        Quantity and condition of the peak; by variable phase the phase follows the maximum from point to point.
+        Resonance and its condition; with ``variable_phase`` the phase follows the maximum from point to point.
     span
         First and last value of the parameter; the last may be the smaller one.
     points
-        Smallest number of points from one to the other; more are taken where the peak changes fast.
+        Smallest number of points over the span; more are added where the peak changes fast.
     peak
         Number of the peak, 0 for the highest at the first value.
 
     Yields
     ------
     PeakPoint
-        Points in the order of the curve, until it leaves the span: at its last value, or, beyond a fold, at its first one. Where it cannot be
-        followed, a point that did not converge, and a new beginning a little further on.
+        Points in the order of the curve, until it leaves the span at its last value or, after a fold, at its first one. Where the curve is
+        lost, a point without convergence follows, and a restart a little further on.
 
     Raises
     ------
     InputError
-        If the span is empty, the number of points is not positive, or there are not so many peaks.
+        If the span is empty, the number of points is not positive, or there are fewer peaks.
     """
     first, last = span
     if not (np.isfinite(first) and np.isfinite(last) and first != last):
@@ -67,7 +67,7 @@ def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, 
     weights = np.ones(size)
     weights[: tracker.problem.family(first).linear.n] = 0.0
     control = replace(steps_through(abs(last - first), points), smallest=SHORTEST)
-    # a corrector gives up soon: at a corner of the curve each trial has another value of the parameter, for which a model may have to be built
+    # few iterations: at a corner of the curve each trial has another parameter value, which may need a new model
     newton = replace(search.how.newton, globalisation="dogleg", max_iterations=FEW)
     way = Following(newton=newton, control=control, weights=weights)
 
@@ -89,14 +89,14 @@ def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, 
 
 @dataclass(eq=False)
 class _Equation:
-    """The equation of the peak, turned from point to point so that it stays regular at folds of the response beside the peak."""
+    """Equation of the peak, realigned at each point so that it stays regular at folds of the response near the peak."""
 
     problem: PeakProblem
     span: tuple[float, float]
     evaluations: int = 0
 
     def linearise(self, y: FloatArray, p: float) -> ParameterEvaluation:
-        """Evaluate everything at (y, p); infinite where a corrector goes far beyond the span, or to a value there that the model refuses."""
+        """Evaluate at (y, p); the result is infinite far beyond the span, or outside it where the model is invalid."""
         self.evaluations += EVALUATIONS[self.problem.by]
         lowest, highest = sorted(self.span)
         margin = BEYOND * (highest - lowest)
@@ -105,14 +105,14 @@ class _Equation:
         try:
             if lowest - margin <= p <= highest + margin:
                 return self.problem.linearise(y, p)
-        except InputError:  # as a negative friction coefficient
+        except InputError:  # such as a negative friction coefficient
             pass
         nothing = np.zeros(y.size)
         return ParameterLinearisation(np.full(y.size, np.inf), np.eye(y.size), 0.0, lambda: nothing)
 
     def turn(self, y: FloatArray, p: float) -> None:
-        """Align the equation with the response at a peak; by variable phase, ask for the phase of the maximum from here on."""
-        # with the row that it has: the sense of the response stays what it was
+        """Align the equation with the response at a peak; with ``variable_phase``, prescribe the phase of the maximum from here on."""
+        # evaluated with the present row, so that the orientation of the response is kept
         self.problem = self.problem.aligned(self.problem.bordered.state(y, p))
         if self.problem.by == "variable_phase":
             self.problem = self.problem.of_the_top(self.problem.state(y, p))
@@ -121,12 +121,12 @@ class _Equation:
 
 @dataclass(frozen=True, eq=False)
 class _PeakCurve(OneLevel):
-    """The curve, which turns its equation at each point."""
+    """Curve that realigns its equation at each point."""
 
     turning: _Equation
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Turn the equation; nothing is judged."""
+        """Realign the equation; no error is estimated."""
         self.turning.turn(point.x, point.p)
         return Judged()
 

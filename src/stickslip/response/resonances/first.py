@@ -1,4 +1,4 @@
-"""First resonance peaks: one sweep, and its maxima."""
+"""Initial resonance peaks: maxima of one sweep."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -23,14 +23,14 @@ from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton
 
-SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak
-STEPS = 12  # of Newton from peak to peak
-EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
-EXACT = 1e-12  # relative residual of sensitivities that are found by iteration ...
+SWEEP_POINTS = 40  # smallest number of points of the sweep
+STEPS = 12  # Newton steps from peak to peak
+EVALUATIONS_BESIDE = 2  # evaluations for a point of a sweep in addition to one for each Newton step: start and tangent
+EXACT = 1e-12  # relative residual of sensitivities from an iterative solver ...
 STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
-FOLD_OVERLAP_LOG_OMEGA = 1e-6  # in ln ω: at a fold a peak may lie beyond both of its neighbours by as much
-SAG = 0.02  # between two points of a sweep a peak stands above both by less: 0.5 % at most of 80 peaks
-STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
+FOLD_OVERLAP_LOG_OMEGA = 1e-6  # distance in ln ω of a peak beyond its neighbours at a fold
+SAG = 0.02  # largest relative height of a peak above the neighbouring sweep points; at most 0.5 % for 80 peaks
+STANDS_OUT = 1.01  # smallest ratio of a maximum to the higher one of the minima beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +40,12 @@ class PeakSearch:
     Parameters
     ----------
     system, load, parameter, omega_range, by, output, how
-        As in `track_peak`, `how` its discretisation.
+        As in `track_peak`; `how` is its discretisation.
     harmonic
-        Harmonic whose amplitude peaks, such as that of a superharmonic resonance; None: the driven harmonics.
+        Harmonic whose amplitude peaks, for example in a superharmonic resonance; None: the driven harmonics.
     periods
         Periods of the load after which the motion repeats; 2 or more for subharmonic resonances. Harmonics, energies and phases then
-        refer to the lower frequency, and the default harmonic is the lowest one. Frequencies are those of the load.
+        refer to the lower frequency, and the default harmonic is the lowest one. `omega_range` always refers to the load.
 
     Raises
     ------
@@ -89,22 +89,22 @@ class PeakSearch:
 
     @property
     def peaking(self) -> int | None:
-        """The harmonic whose amplitude peaks; None for those that the load drives."""
+        """Harmonic whose amplitude peaks; None for the driven ones."""
         return 1 if self.harmonic is None and self.periods > 1 else self.harmonic
 
     @property
     def lower_range(self) -> tuple[float, float]:
-        """The range of the frequency of the first harmonic, rad/s."""
+        """Range of the first harmonic's frequency, rad/s."""
         begin, end = self.omega_range
         return begin / self.periods, end / self.periods
 
     @property
     def peaking_dof(self) -> int:
-        """The dof whose amplitude peaks."""
+        """Dof whose amplitude peaks."""
         return int(self.system.outputs[self.output])
 
     def family(self, first: float) -> BalanceAt:
-        """Return the balances of the values of the parameter, scaled as the `first` one."""
+        """Return the balances as a function of the parameter, scaled as for the `first` value."""
         return parameter_family(
             self.system,
             self.load,
@@ -114,7 +114,7 @@ class PeakSearch:
         )
 
     def problem(self, first: float) -> PeakProblem:
-        """Return the equation of a peak, its frequencies measured by the end of the range."""
+        """Return the equation of a peak, with frequencies scaled by the end of the range."""
         family = self.family(first)
         balance = family(first)
         harmonics, phase = driven_by(balance.linear.load)
@@ -127,7 +127,7 @@ class PeakSearch:
                     "Only odd multiples of the load's harmonic peak in quadrature with it: take horizontal_tangent or variable_phase.",
                 )
             own = balance.linear.load.harmonics.get(self.peaking)
-            # the phase that a shift of the origin of time gives this harmonic; of a driven one that of its own force
+            # a driven harmonic has the phase of its force; another one shifts with the origin of time like the load
             phase = phase * times if own is None else float(np.angle(own[np.argmax(np.abs(own))]))
             harmonics = (self.peaking,)
         position = int(np.searchsorted(balance.linear.retained, self.peaking_dof))
@@ -139,12 +139,12 @@ class PeakSearch:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Near a peak.
+    """Start near a peak.
 
     Parameters
     ----------
     problem
-        The equation, its frequencies measured by that of the peak.
+        Equation of the peak, with frequencies scaled by the peak's.
     y
         (size + 1,) unknowns.
     value
@@ -163,7 +163,7 @@ class Start:
 
 
 def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
-    """Return the peaks of the response at a value of the parameter, the highest first, and the number of evaluations of the sweep.
+    """Return the peaks of the response at a parameter value, the highest first, and the number of evaluations of the sweep.
 
     Raises
     ------
@@ -197,14 +197,14 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
 
 
 def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]:
-    """Return for each peak at one value of the parameter whether a sweep passes over it.
+    """Return for each peak at one parameter value whether a sweep passes it.
 
     Parameters
     ----------
     search
-        Quantity of the peak; its range of frequencies is swept once.
+        Resonance; its range of frequencies is swept once.
     peaks
-        All at the same value, which converged.
+        Converged peaks at the same value.
     """
     value = peaks[0].value
     problem = search.problem(value)
@@ -217,7 +217,7 @@ def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]
 
 
 def _goes_over(log_omega: FloatArray, log_height: FloatArray, peak: PeakPoint) -> bool:
-    """Whether a curve of points goes over a peak: two of them next to each other on its sides, at its height."""
+    """Whether a curve of points passes a peak: two neighbouring points on both sides of it have its height."""
     place, height = np.log(peak.omega), np.log(peak.amplitude)
     low = np.minimum(log_omega[:-1], log_omega[1:]) - FOLD_OVERLAP_LOG_OMEGA
     high = np.maximum(log_omega[:-1], log_omega[1:]) + FOLD_OVERLAP_LOG_OMEGA
@@ -226,7 +226,7 @@ def _goes_over(log_omega: FloatArray, log_height: FloatArray, peak: PeakPoint) -
 
 
 def _swept(search: PeakSearch, problem: PeakProblem, value: float) -> tuple[list[Point], ComplexArray]:
-    """Return the points of a sweep at a value of the parameter, and the motion of the output in each."""
+    """Return the points of a sweep at a parameter value, and the motion of the output at each."""
     balance, how = problem.family(value), search.how
     changed = system_at(search.system, search.parameter, value, balance)
     if search.periods > 1:
@@ -241,7 +241,7 @@ def _swept(search: PeakSearch, problem: PeakProblem, value: float) -> tuple[list
 
 
 def maxima(heights: FloatArray) -> list[int]:
-    """Return where heights along a branch have maxima that stand out, the highest first; those at the ends are none."""
+    """Return the indices of distinct maxima of heights along a branch, the highest first, without the ends."""
     order = np.argsort(-heights)
     found = []
     for top in map(int, order):
@@ -254,7 +254,7 @@ def maxima(heights: FloatArray) -> list[int]:
 
 
 def _descent(heights: FloatArray, top: int, way: int) -> float:
-    """Return the lowest height between a place and the next higher one in a direction; of equal ones the first is the higher one."""
+    """Return the lowest height between an index and the next higher point in a direction; of equal heights the first counts as higher."""
     beside = heights[top + 1 :] if way > 0 else heights[top - 1 :: -1]
     higher = np.flatnonzero(beside > heights[top] if way > 0 else beside >= heights[top])
     between = beside[: higher[0]] if higher.size else beside

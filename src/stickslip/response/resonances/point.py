@@ -13,19 +13,19 @@ from stickslip.solve.status import Status
 
 @dataclass(frozen=True, eq=False)
 class PeakPoint:
-    """A resonance peak at one value of the design parameter.
+    """Resonance peak at one value of the design parameter.
 
     Attributes
     ----------
     value
         Value of the parameter.
     omega
-        Frequency of the peak, rad/s; of a subharmonic resonance that of the load.
+        Frequency of the peak, rad/s; for a subharmonic resonance, the frequency of the load.
     amplitude
-        Amplitude of the output in the harmonic that the load drives, m; with several, the norm over them; or in the harmonic asked for.
+        Amplitude of the output in the driven harmonic or the requested one, m; for several driven harmonics, the norm.
     phase
-        Phase of the output against the force, rad, in the first of these harmonics; -π/2 in quadrature. Of a harmonic h that the load
-        does not drive, against h times the phase of the force.
+        Phase of the output relative to the force, rad, in the first of these harmonics; -π/2 in quadrature. For a harmonic h that the load
+        does not drive, relative to h times the phase of the force.
     slope
         Derivative of the amplitude by the parameter along the curve of peaks, m over the parameter's unit.
     curvature
@@ -35,7 +35,7 @@ class PeakPoint:
     friction
         Dissipation of the contacts, J.
     below
-        Relative amount by which the nearby maximum is higher, from slope and curvature of the response; 0 at a horizontal tangent, NaN
+        Relative height of the nearby maximum above this point, from slope and curvature of the response; 0 at a horizontal tangent, NaN
         without a maximum.
     coefficients
         (order+1, n) complex displacement of all dofs of the structure, m.
@@ -44,9 +44,9 @@ class PeakPoint:
     iterations
         Newton steps.
     evaluations
-        Number of evaluations of the periodic problem, including those of slope and curvature, and in the first point those of the sweep.
+        Number of evaluations of the periodic problem, including slope and curvature, and for the first point the sweep.
     peak
-        Number of the peak, from 0, where several are followed: 0 is the highest at the first value.
+        Number of the peak from 0, if several are followed; 0 is the highest at the first value.
     """
 
     value: float
@@ -71,7 +71,7 @@ class PeakPoint:
 
     @property
     def is_maximum(self) -> bool:
-        """Whether the amplitude falls on both sides: a horizontal tangent may also be a minimum or a saddle."""
+        """Whether the point is a maximum; a horizontal tangent may also be a minimum or a saddle."""
         return self.curvature < 0.0
 
 
@@ -85,7 +85,7 @@ def peak_point(
     problem
         The equation.
     force
-        Phase of the force in the first of the harmonics that peak, rad.
+        Phase of the force in the first of the peaking harmonics, rad.
     value
         Value of the parameter.
     solution
@@ -130,7 +130,7 @@ def put_in(balance: HarmonicBalance, motion: ComplexArray, omega: float) -> floa
 
 
 def taken(balance: HarmonicBalance, x: FloatArray, omega: float) -> float:
-    """Return the work that the contacts take over such a period, J, at the unknowns `x`."""
+    """Return the dissipation of the contacts over a period of the first harmonic, J, at the unknowns `x`."""
     force = np.zeros((balance.n_rows, balance.linear.n))
     balance.rows.add_forces(balance.forces(x, omega).coefficients, force)
     motion = balance.displacement_scale * x.reshape(force.shape)

@@ -1,7 +1,7 @@
-"""Onset of subharmonic resonances, which no branch of the response leads to.
+"""Search for subharmonic resonances on branches isolated from the response.
 
-The branch is isolated as a rule. It is looked for by Newton's method from the response of one period with the motion added that it resists least at the
-lower frequency, of many amplitudes and phases; and then followed through the frequencies, both ways.
+Newton's method starts from the period-one response plus the motion of least resistance at the lower frequency, with various amplitudes and phases. The
+branch of a solution is then followed over the frequency in both directions.
 """
 
 from collections.abc import Iterator
@@ -18,14 +18,14 @@ from stickslip.solve.branch import Following
 from stickslip.solve.continuation import Point, reversed_point, start_point, trace
 from stickslip.solve.newton_method import Newton, newton
 
-FREQUENCIES = 9  # within the range at which motions are looked for
-AMPLITUDES = (1.0, 2.0, 4.0, 8.0, 0.5, 16.0)  # over that of the response of one period
-PHASES = 6  # within the turn after which the motion is the same one, some periods of the load later
-LEAST = 1e-3  # of the whole motion in the lowest harmonic: less is the response of one period
-CLOSED = 0.02  # distance from where it began, of its size and of the range, at which a branch has closed ...
-FEW = 8  # ... but not within so many points
-BESIDE = 0.1  # of the range by which a branch may leave it
-POINTS = 200  # of a branch either way
+FREQUENCIES = 9  # of the search within the range
+AMPLITUDES = (1.0, 2.0, 4.0, 8.0, 0.5, 16.0)  # over the amplitude of the period-one response
+PHASES = 6  # within the range of distinct phases; beyond, the motion is the same some load periods later
+LEAST = 1e-3  # share of the lowest harmonic in the motion, below which it is the period-one response
+CLOSED = 0.02  # distance from its start, relative to the motion and to the range, at which a branch has closed ...
+FEW = 8  # ... after at least this number of points
+BESIDE = 0.1  # distance of a branch beyond the range, over the range
+POINTS = 200  # of a branch in each direction
 
 
 def motions_of_several_periods(
@@ -36,7 +36,7 @@ def motions_of_several_periods(
     points: int,
     options: Newton,
 ) -> list[Point]:
-    """Return motions of several periods of the load through the frequencies, in the order of their branch.
+    """Return motions that repeat after several load periods, over the frequency, in the order of their branch.
 
     Parameters
     ----------
@@ -47,16 +47,16 @@ def motions_of_several_periods(
     omega_range
         Range of the lower frequency, rad/s.
     periods
-        Periods of the load in one period of the motion.
+        Load periods in one period of the motion.
     points
-        Steps through the range, at least.
+        Smallest number of steps through the range.
     options
-        Corrector.
+        Corrector options.
 
     Raises
     ------
     InputError
-        If none is found.
+        If no such motion is found.
     """
     first, last = omega_range
     way = following_vibration(balance, steps_through(last - first, points), options)
@@ -79,7 +79,7 @@ def motions_of_several_periods(
 def _motions(
     system: System, balance: HarmonicBalance, omega: float, periods: int, options: Newton
 ) -> Iterator[FloatArray]:
-    """Yield motions at a frequency whose lowest harmonic is there."""
+    """Yield motions with a lowest harmonic at a frequency."""
     plain = without_branch(system, balance, options, omega)
     if not plain.status.converged:
         return
@@ -107,7 +107,7 @@ def _subharmonic(balance: HarmonicBalance, x: FloatArray) -> bool:
 def _followed(
     balance: HarmonicBalance, start: Point, omega_range: tuple[float, float], end: float, way: Following
 ) -> list[Point]:
-    """Follow the branch until it leaves the range, closes or is no subharmonic one any more."""
+    """Follow the branch until it leaves the range, closes or joins the period-one response."""
     found: list[Point] = []
     first, last = omega_range
     beside = BESIDE * (last - first)

@@ -1,9 +1,8 @@
-"""The resonance peak followed directly while a design parameter varies, without a sweep for each value.
+"""Direct tracking of resonance peaks over a design parameter, without a sweep for each value.
 
-Each peak is the solution of one equation (see `harmonic.peak`), started from the peak before. A damper optimisation curve costs a few
-Newton steps a point, and its lowest point is the root of the exact slope of the peak amplitude.
-
-Each step starts from the peaks before it. Where a step is too long, it goes through intermediate values of the parameter.
+Each peak is the solution of one equation (see `harmonic.peak`), started from the previous peaks. A damper optimisation curve costs a few Newton
+steps for each point, and its lowest point is the root of the exact slope of the peak amplitude. Where a step is too long, intermediate values
+of the parameter are inserted.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,31 +24,33 @@ from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Status
 
-APART = 1e-5  # relative distance of the frequencies of two peaks that are not the same
-HALVINGS = 6  # of a step of the parameter that does not converge
-FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was found
-BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
-SEARCH = 60  # solutions that may be spent on a bracket
-FAR = 2.0  # steps beyond the last peak up to which a line through the last two is gone on
-PEAK_FREQUENCY_RTOL = 1e-6  # relative distance of frequencies of two solutions that are one peak
+APART = 1e-5  # relative distance in frequency above which two peaks differ
+HALVINGS = 6  # of a failed parameter step
+FARTHEST = 0.1  # change of ln ω in one step above which the solution is another peak
+BRACKET = 1e-12  # width in ln ω at which a peak on a kink is found
+SEARCH = 60  # largest number of solutions for a bracket
+FAR = 2.0  # largest extrapolation through the last two peaks, in steps
+PEAK_FREQUENCY_RTOL = 1e-6  # relative distance in frequency up to which two solutions are the same peak
 
 
 @dataclass(slots=True)
 class Tracker:
-    """The peaks found so far, from which the next ones start."""
+    """Tracker of one peak, with the peaks so far as starts."""
 
     problem: PeakProblem
     newton: Newton
     known: list[tuple[float, FloatArray]]
     force: float  # phase of the load in the first harmonic that peaks, rad
-    periods: int = 1  # of the load in one of the motion
+    periods: int = 1  # load periods in one period of the motion
     evaluations: int = 0
     number: int = 0
-    corner: bool = False  # whether the last peak sits on a corner of the response
-    tops: list[tuple[float, float]] = field(default_factory=list)  # phases of the last two maxima, by variable phase
+    corner: bool = False  # whether the last peak lies on a corner of the response
+    tops: list[tuple[float, float]] = field(
+        default_factory=list
+    )  # values and phases of the last two maxima, for variable_phase
 
     def point(self, value: float) -> PeakPoint:
-        """Find the peak at a value of the parameter, from those known."""
+        """Find the peak at a parameter value from the known peaks."""
         solution = self.reached(value)
         if solution.status.converged:
             self._turn(solution.x, value)
@@ -70,7 +71,7 @@ class Tracker:
         self._turn(y, point.value)
 
     def _turn(self, y: FloatArray, value: float) -> None:
-        """Align the equation with the response at a peak, and keep the phase of the maximum beside it."""
+        """Align the equation with the response at a peak, and store the phase of the nearby maximum."""
         state = self.problem.state(y, value)
         self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
         self.problem = self.problem.aligned(state)
@@ -78,7 +79,7 @@ class Tracker:
             self.tops = [*self.tops[-1:], (value, self.problem.of_the_top(state).phase)]
 
     def reached(self, value: float, halvings: int = HALVINGS) -> Solution:
-        """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
+        """Solve from the predicted peak; if this fails, through intermediate values or by bracketing."""
         self._ask(value)
         solution, last = self._solved(value), self.known[-1][0]
         if not solution.status.converged and halvings > 0 and last != value:
@@ -96,7 +97,7 @@ class Tracker:
         return solution
 
     def _ask(self, value: float) -> None:
-        """Ask for the phase that the last maxima lead to, on a line through two of them."""
+        """Prescribe the phase extrapolated from the last two maxima."""
         if self.problem.by != "variable_phase":
             return
         (before, earlier), (p, phase) = self.tops[0], self.tops[-1]
@@ -106,7 +107,7 @@ class Tracker:
         self.problem = replace(self.problem, phase=phase)
 
     def _predicted(self, value: float) -> FloatArray:
-        """Extrapolate through the last two peaks, or along the tangent at the only one; use the last one if the extrapolation is far."""
+        """Extrapolate through the last two peaks, or along the tangent of a single one; return the last peak if the extrapolation is too far."""
         (before, earlier), (p, y) = self.known[0], self.known[-1]
         if p != before:
             share = (value - p) / (p - before)
@@ -120,7 +121,7 @@ class Tracker:
         return y if change is None or abs(change[-1]) > FARTHEST else y + change
 
     def _solved(self, value: float) -> Solution:
-        """Solve from the predicted peak; another peak than the one that was followed is none."""
+        """Solve from the predicted peak; a solution at another peak counts as failed."""
         guess = self._predicted(value)
 
         def evaluate(v: FloatArray) -> ParameterEvaluation:
@@ -133,7 +134,7 @@ class Tracker:
         return replace(solution, status=Status.STALLED)
 
     def _is_same(self, y: FloatArray, guess: FloatArray, value: float) -> bool:
-        """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
+        """Whether a solution is the tracked peak: it is near, and no minimum between two peaks."""
         if abs(y[-1] - guess[-1]) > FARTHEST:
             return False
         if self.problem.by != "horizontal_tangent":
@@ -142,12 +143,12 @@ class Tracker:
         return not self.problem.curvature(self.problem.state(y, value)) > 0.0
 
     def _bracketed(self, value: float) -> Solution:
-        """Find the top of a response whose slope jumps there: a kink, or the steps that samples make."""
+        """Find the peak of a response whose slope jumps there, at a kink or by sampling errors."""
         balance, y = self.problem.family(value), self._predicted(value)
         spent = [Solution(y[:-1], Status.STALLED, 0, np.nan, 0.0, 0.0)]
 
         def rate(place: float) -> float:
-            """Solve at ``ln(ω / omega_scale) = place`` from the last solution, and return the slope there."""
+            """Solve at ``ln(ω / omega_scale) = place`` from the last solution; return the slope."""
             omega = self.problem.omega(np.array([place]))
             spent.append(newton(lambda v: balance.linearise(v, omega), spent[-1].x, self.newton))
             self.evaluations += spent[-1].iterations + 2
@@ -165,7 +166,7 @@ class Tracker:
 
 
 def _sign_change(rate: Callable[[float], float], at: float, step: float) -> float:
-    """Climb until the slope changes its sign, then close the bracket."""
+    """Climb until the slope changes its sign, then find the root."""
     slope = rate(at)
     step = step if slope > 0.0 else -step
     for _ in range(SEARCH):
@@ -176,7 +177,7 @@ def _sign_change(rate: Callable[[float], float], at: float, step: float) -> floa
 
 
 def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
-    """Return trackers of the `most` highest peaks at a value of the parameter; the first one has the cost of the sweep."""
+    """Return trackers of the `most` highest peaks at a parameter value; the first one includes the cost of the sweep."""
     starts, spent = first_peaks(search, value)
     made: list[Tracker] = []
     for start in starts:
@@ -192,7 +193,7 @@ def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
 
 
 def _tracker(search: PeakSearch, start: Start) -> Tracker:
-    """Return the tracker of one peak; the phase of the variable one is that at the maximum, which is found first."""
+    """Return the tracker of one peak; for ``variable_phase``, the maximum is found first and gives the phase."""
     force = start.problem.phase
     known = [(start.value, start.y)]
     if start.problem.by != "variable_phase":
@@ -208,7 +209,7 @@ def _tracker(search: PeakSearch, start: Start) -> Tracker:
 
 
 def _is_another(one: Tracker, made: list[Tracker]) -> bool:
-    """Whether a tracker leads to a peak that none of those before it has."""
+    """Whether a tracker leads to another peak than all previous trackers."""
     value, _ = one.known[-1]
     found = one.reached(value)
     if not found.status.converged:
@@ -219,7 +220,7 @@ def _is_another(one: Tracker, made: list[Tracker]) -> bool:
 
 
 def represented_as(search: PeakSearch, point: PeakPoint, how: Discretisation) -> PeakPoint:
-    """Return a peak with other harmonics, solved from the known one by horizontal tangent."""
+    """Return a peak solved with other harmonics, from the known one by horizontal tangent."""
     more = replace(search, how=how, by="horizontal_tangent")
     problem = more.problem(point.value)
     problem = replace(problem, omega_scale=point.omega / search.periods)
@@ -242,7 +243,7 @@ def track_peak(
     output: int = 0,
     discretisation: Discretisation | None = None,
 ) -> Iterator[PeakPoint]:
-    """Follow the highest resonance peak through the values of a design parameter; `follow_peaks` follows several, and harmonics that are not driven.
+    """Follow the highest resonance peak over a design parameter; `follow_peaks` follows several, also in harmonics that are not driven.
 
     Parameters
     ----------
@@ -253,15 +254,15 @@ def track_peak(
     parameter
         As in `branch_in_parameter`: a factor on a load, a field of the contact laws, or a function of the value.
     values
-        Values of the parameter, in the order in which they are to be visited.
+        Values of the parameter, in the order of the computation.
     omega_range
-        Frequencies between which the first peak is searched for by a sweep, rad/s.
+        Frequency range of the initial sweep for the first peak, rad/s.
     by
-        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to it for
-        a lightly damped resonance, and cheaper; ``variable_phase``: the output has the phase of the
-        largest amplitude beside the last peak, which serves several forces and modes, and harmonics that are not driven.
+        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to the maximum
+        of a lightly damped resonance, and cheaper; ``variable_phase``: the output has the phase of the maximum near the last peak, which
+        also suits several forces and modes, and harmonics that are not driven.
     output
-        Position among the outputs of the dof whose amplitude peaks.
+        Number of the output whose amplitude peaks.
     discretisation
         Harmonics, samples, solver.
 
@@ -273,8 +274,8 @@ def track_peak(
     Raises
     ------
     InputError
-        If there are no values, the parameter, the condition or the output is unknown, the load drives no harmonic, or the range holds no
-        peak at the first value.
+        If there are no values, the parameter, condition or output is unknown, the load drives no harmonic, or the range has no peak at the
+        first value.
     """
     how = discretisation or Discretisation()
     one = PeakSearch(system, load, parameter, omega_range, by, output, how)
@@ -285,29 +286,29 @@ def track_peak(
 def follow_peaks(
     search: PeakSearch, values: Sequence[float] | FloatArray, most: int = 3, done: Sequence[PeakPoint] = ()
 ) -> Iterator[PeakPoint]:
-    """Follow several resonance peaks through the values of a design parameter, each from its own last one.
+    """Follow several resonance peaks over a design parameter, each from its previous points.
 
     Parameters
     ----------
     search
         Resonance and condition.
     values
-        Values of the parameter, in the order in which they are to be visited.
+        Values of the parameter, in the order of the computation.
     most
-        Number of peaks, the highest of the first value; fewer where it has fewer.
+        Largest number of peaks, the highest ones at the first value.
     done
         Points of an interrupted run, which are not computed again.
 
     Yields
     ------
     PeakPoint
-        Points not in `done`, one for each value and peak, all peaks of a value before the next value. Where two peaks merge, the one with
-        the longer step ends.
+        Points not in `done`, one for each value and peak, with all peaks of a value before the next value. If two peaks merge, the one with
+        the larger change ends.
 
     Raises
     ------
     InputError
-        If there are no values, or the range holds no peak at the first.
+        If there are no values, or the range has no peak at the first value.
     """
     followed = trackers(search, float(values[0]) if len(values) else np.nan, most)
     yield from _through(followed, values, done)
@@ -319,7 +320,7 @@ def _through(
     done: Sequence[PeakPoint],
     others: Sequence[PeakPoint] = (),
 ) -> Iterator[PeakPoint]:
-    """Follow peaks through the values; one that has become another one, of these or of the `others`, ends."""
+    """Follow peaks over the values; a peak ends where it merges with another one, of these or of the `others`."""
     known = {(p.value, p.peak): p for p in done}
     going, last = list(followed), dict[int, PeakPoint]()
     for value in map(float, values):
@@ -331,7 +332,7 @@ def _through(
             here.append(tracker.point(value) if stored is None else stored)
         there = [p for p in others if p.value == value]
         kept: list[PeakPoint] = []
-        # the one that had to go the least way is the one that goes on
+        # of merged peaks the one with the smallest change continues
         for point in sorted(here, key=lambda p: _way(last.get(p.peak), p)):
             if not any(_is_one(point, other) for other in (*there, *kept)):
                 kept.append(point)
@@ -345,7 +346,7 @@ def _through(
 
 
 def _is_one(one: PeakPoint, other: PeakPoint) -> bool:
-    """Whether two points of the same value are one peak."""
+    """Whether two points at the same value are the same peak."""
     if not (one.converged and other.converged):
         return False
     near = abs(one.omega - other.omega) <= APART * other.omega
@@ -365,7 +366,7 @@ def later_peaks(
     most: int = 3,
     done: Sequence[PeakPoint] = (),
 ) -> Iterator[PeakPoint]:
-    """Follow backwards the peaks at the last value that no peak followed from the first value reaches.
+    """Follow backwards the peaks at the last value that were not reached from the first value.
 
     Parameters
     ----------
@@ -377,7 +378,7 @@ def later_peaks(
     Yields
     ------
     PeakPoint
-        From the last value to the first, numbered after the known ones. One that becomes a known one ends.
+        Points from the last value to the first, numbered after the known peaks. A peak ends where it merges with a known one.
     """
     last = float(values[-1])
     there = [p.omega for p in known if p.value == last and p.converged]
@@ -401,19 +402,19 @@ def smallest_peak(
     output: int = 0,
     discretisation: Discretisation | None = None,
 ) -> PeakPoint:
-    """Return the design with the smallest resonance peak: the value of the parameter at which the peak amplitude is stationary.
+    """Return the design with the smallest resonance peak, at the parameter value with a stationary peak amplitude.
 
     Parameters
     ----------
     system, load, parameter, omega_range, output, discretisation
         As in `track_peak`.
     span
-        Two values between which the peak falls first and then rises.
+        Two values between which the peak amplitude first falls and then rises.
 
     Raises
     ------
     InputError
-        If the peak is not found at an end, or its amplitude has a slope of the same sign at both.
+        If the peak is not found at an end, or its amplitude has slopes of the same sign at both ends.
     """
     how = discretisation or Discretisation()
     asked = PeakSearch(system, load, parameter, omega_range, "horizontal_tangent", output, how)

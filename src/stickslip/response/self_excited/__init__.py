@@ -1,4 +1,4 @@
-"""Self-excited vibration: limit cycles of unstable waves that friction bounds, and their stability."""
+"""Self-excited vibration: limit cycles of unstable waves bounded by friction, and their stability."""
 
 import lazy_loader
 

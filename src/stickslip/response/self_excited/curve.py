@@ -20,20 +20,20 @@ from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, first_converged, newton
 from stickslip.solve.status import Status
 
-FAINT = 1e-11  # m: a gap that moves less slips nowhere
-STATIC_SHARE = 1e-5  # of the static displacement: a vibration that is smaller stands in its rounding
-NOISE = 10.0  # times what is left of the equations in the linear mode: more is a contact
+FAINT = 1e-11  # m: smallest gap motion that may slip
+STATIC_SHARE = 1e-5  # vibration over static displacement, below which it is lost in rounding
+NOISE = 10.0  # factor on the residual of a sticking motion, above which a contact has changed its state
 MOST_DOUBLINGS = 80
-SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
-ONSET = 1.01  # to which the amplitude is found at which slip begins
+SLIPS = 1e-6  # residual over the elastic force of the mode, above which a contact has changed its state
+ONSET = 1.01  # largest ratio of the bounds on the amplitude at the onset of slip
 LARGEST = 0.25
-QUICK = 10  # Newton steps from a motion that sticks to one that sticks about another mean
+QUICK = 10  # Newton steps to a sticking motion about another mean
 PATIENT = Newton(max_iterations=60, globalisation="levenberg_marquardt")
 
 
 @dataclass(frozen=True, eq=False)
 class AmplitudePoint:
-    """A periodic motion of given amplitude.
+    """Periodic motion of given amplitude.
 
     Parameters
     ----------
@@ -42,12 +42,11 @@ class AmplitudePoint:
     omega
         Frequency, rad/s.
     level
-        Damping ratio of the motion, negative where its amplitude grows; or the value of the parameter at which the motion is
-        self-sustained.
+        Damping ratio of the motion, negative if its amplitude grows; or the value of the parameter for which it is a limit cycle.
     order
         Highest harmonic.
     unknowns
-        Unknowns of the equation.
+        Unknowns of the periodic problem.
     status
         How the solver ended; a point that did not converge is no motion.
     iterations
@@ -69,19 +68,19 @@ class AmplitudePoint:
 
 
 def slip_amplitude(problem: SelfExcited) -> float:
-    """Return the amplitude, m, at which the first contact leaves the state that it has in the mode, to a percent.
+    """Return the amplitude at the onset of slip or lift-off, m, within one percent.
 
-    Contacts that stand on their limits under the static load leave it at once, and stick again about another mean: that is none.
+    Contacts at their slip limit under the static load slip at once, but stick again about another mean; this is no onset.
 
     Raises
     ------
     InputError
-        If none does.
+        If no contact slips or opens.
     """
     static = preload(problem.system, problem.load.static)
     mode = problem.relative(problem.guess(static, 1.0))[1]
     largest = float(np.max(np.abs(problem.balance.interface.gap_operator @ mode), initial=0.0))
-    # far below what the static state can be told to, rounding would be all that there is to see
+    # smaller vibrations are lost in the rounding of the static state
     least = STATIC_SHARE * float(np.max(np.abs(static), initial=0.0))
     amplitude = max(FAINT / largest, least) if largest > 0.0 else np.inf
     equation = problem.over_amplitude()
@@ -104,7 +103,7 @@ def slip_amplitude(problem: SelfExcited) -> float:
 
 
 def _onset(known: "_Sticking", below: float, amplitude: float) -> float:
-    """Return the amplitude at which slip begins between two, to a percent."""
+    """Return the amplitude at the onset of slip between two amplitudes, within one percent."""
     while amplitude > ONSET * below:
         middle = float(np.sqrt(below * amplitude))
         slips = known.leaves(middle) and known.beyond(middle) is None
@@ -114,7 +113,7 @@ def _onset(known: "_Sticking", below: float, amplitude: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Sticking:
-    """A motion in which no contact changes its state; as long as none does it grows in proportion about the same mean."""
+    """Motion in which no contact changes its state; its vibration is proportional to the amplitude, about a constant mean."""
 
     problem: SelfExcited
     equation: PeriodicProblem
@@ -132,7 +131,7 @@ class _Sticking:
         near: Sequence[FloatArray],
         known: Signed | None = None,
     ) -> "_Sticking | None":
-        """Return the motion at an amplitude, from others that may be near; None if there is none."""
+        """Return the sticking motion at an amplitude, from nearby motions; None without one."""
         p = float(np.log(amplitude))
         how = problem.how.newton
         kept = KeptFactors(how.tolerance, GLOBALISATIONS[how.globalisation](), known)
@@ -148,25 +147,25 @@ class _Sticking:
         return cls(problem, equation, amplitude, found.x, noise, kept.inverse)
 
     def grown(self, amplitude: float) -> FloatArray:
-        """Return the unknowns in proportion at another amplitude."""
+        """Return the unknowns scaled to another amplitude."""
         out = self.y.copy()
         out[: self.problem.balance.linear.n] *= self.amplitude / amplitude
         return out
 
     def beyond(self, amplitude: float) -> "_Sticking | None":
-        """Return the motion at a larger amplitude, about another mean, if its contacts do not change their states either."""
+        """Return the sticking motion at a larger amplitude, about another mean; None without one."""
         start = self.grown(amplitude)
         return self.at(self.problem, self.equation, amplitude, [start], self.inverse)
 
     def leaves(self, amplitude: float) -> bool:
-        """Whether a contact leaves its state before an amplitude."""
+        """Whether a contact changes its state below an amplitude."""
         left = self.equation.residual(self.grown(amplitude), float(np.log(amplitude)))
         return bool(np.max(np.abs(left)) > max(SLIPS, self.noise))
 
 
 @by_one_thread
 def damping_over_amplitude(problem: SelfExcited, span: tuple[float, float], points: int = 30) -> list[AmplitudePoint]:
-    """Follow the motions of a mode over their amplitude, with the damping of each.
+    """Follow the motions of a mode and their damping over the amplitude.
 
     Parameters
     ----------
@@ -175,7 +174,7 @@ def damping_over_amplitude(problem: SelfExcited, span: tuple[float, float], poin
     span
         First and last amplitude, m.
     points
-        Least number of points.
+        Smallest number of points.
     """
     return [_of_point(problem, f) for f in _followed(problem, problem.over_amplitude(), span, points)]
 
@@ -189,22 +188,22 @@ def parameter_over_amplitude(
     span: tuple[float, float],
     points: int = 40,
 ) -> list[AmplitudePoint]:
-    """Follow limit cycles over their amplitude, with the value of a parameter as the unknown.
+    """Follow limit cycles over their amplitude, with a parameter as the unknown.
 
     Parameters
     ----------
     problem
         The mode.
     parameter
-        As in `branch_in_parameter`: a field of the contact laws, or a function of the value, as one that has a factor on the aerodynamic forces.
+        As in `branch_in_parameter`: a field of the contact laws, or a function of the value, such as a factor on the aerodynamic forces.
     near
-        Value of the parameter at the first amplitude, about.
+        Approximate value of the parameter at the first amplitude.
     cycle
-        Unknowns of a limit cycle near it.
+        Unknowns of a nearby limit cycle.
     span
         First and last amplitude, m.
     points
-        Least number of points.
+        Smallest number of points.
     """
     scale = abs(near) or 1.0
     equation = problem.over_amplitude(levels(problem, parameter, near), scale)
@@ -214,13 +213,13 @@ def parameter_over_amplitude(
 
 
 def at_amplitude(problem: SelfExcited, amplitude: float, near: Sequence[FloatArray] = ()) -> AmplitudePoint:
-    """Return the motion of an amplitude (m) and its damping, from unknowns of motions that may be near or from the linear mode."""
+    """Return the motion of an amplitude, m, and its damping, from unknowns of nearby motions or from the linear mode."""
     found = _solved(problem, problem.over_amplitude(), float(np.log(amplitude)), near)
     return _point(problem, amplitude, found)
 
 
 def _of_point(problem: SelfExcited, followed: Followed) -> AmplitudePoint:
-    """Return the record of a point of a curve over the amplitude, with its level as a damping ratio."""
+    """Return a point of a curve over the amplitude, with its level as a damping ratio."""
     return _point(problem, float(np.exp(followed.p)), followed.point.solution)
 
 
@@ -250,7 +249,7 @@ def _followed(
 
 
 def _solved(problem: SelfExcited, equation: PeriodicProblem, p: float, near: Sequence[FloatArray]) -> Solution:
-    """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
+    """Solve at an amplitude from nearby motions, or from the linear mode about the static state."""
     static = preload(problem.system, problem.load.static)
     starts = [*near, problem.guess(static, float(np.exp(p)))]
     attempts = (
@@ -262,7 +261,7 @@ def _solved(problem: SelfExcited, equation: PeriodicProblem, p: float, near: Seq
 
 
 def _weights(problem: SelfExcited) -> FloatArray:
-    """Return the share of each unknown in the length of a step: of the vibration, the frequency and the level, not of the mean."""
+    """Return the weight of each unknown in the step length: vibration, frequency and level count, the mean does not."""
     weights = np.ones(problem.balance.size + 2)
     weights[: problem.balance.linear.n] = 0.0
     return weights

@@ -1,6 +1,6 @@
-"""Limit cycles: zeros of the damping over the amplitude, each solved as an autonomous problem with as many harmonics as it needs.
+"""Limit cycles: zeros of the damping over the amplitude, solved as autonomous problems with adaptive harmonics.
 
-Multipliers give the stability of a cycle, on a wheel against every wave.
+Floquet multipliers give the stability of a cycle, on a wheel against disturbances of every wave.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,13 +21,15 @@ from stickslip.response.time.sectors import all_in_time
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
 
-SHORTEST = 1e-3  # share of the damping by which it is taken away at least
-FARTHEST_STEP = 0.2  # of ln a in such a step: beyond, it is another motion
-MORE = 2  # times the harmonics, and one, at each step
-SMALL = 1e-5  # change of the motion over which its energy is differenced
-SHARP = 1e-4  # of ln a, to which an extreme of the damping is found: its value is then known to the square of that
-AT_A_FOLD = 0.02  # of ln a: a curve may turn back between two points
-BRACKETED = 1.0  # times the distance of the two amplitudes by which a cycle may lie outside of them
+SHORTEST = 1e-3  # smallest step in the removal of damping, over the initial damping
+FARTHEST_STEP = 0.2  # largest change of ln a in such a step: beyond, it is another motion
+MORE = 2  # harmonics are raised from h to MORE h + 1
+SMALL = 1e-5  # change of the motion for the derivative of its energy
+SHARP = 1e-4  # accuracy of ln a at an extreme of the damping, whose value is then accurate to the square
+AT_A_FOLD = (
+    0.02  # smallest allowed distance in ln a between cycle and bracket: a curve may turn back between two points
+)
+BRACKETED = 1.0  # distance in ln a between cycle and bracket, over the width of the bracket
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,18 +43,18 @@ class LimitCycle:
     omega
         Frequency, rad/s.
     slope
-        ``dζ / d ln √E`` with the kinetic energy E of the first harmonic, which is the amplitude of its mode: positive where friction grows
-        faster than what feeds the motion, so that it is attracting.
+        ``dζ / d ln √E``, where the kinetic energy E of the first harmonic measures the amplitude of the mode. Positive if the dissipation by
+        friction grows faster than the energy input: then the cycle is attracting.
     order
         Highest harmonic.
     change
-        Larger relative change of amplitude and frequency by the last raise of the harmonics; NaN without a raise.
+        Relative change of amplitude or frequency by the last raise of the harmonics, the larger one; NaN without a raise.
     enough
         Whether the change is below the tolerance.
     coefficients
         (order + 1, n_retained) complex amplitudes, m.
     unknowns
-        Unknowns of the autonomous equation.
+        Unknowns of the autonomous problem.
     """
 
     amplitude: float
@@ -74,7 +76,7 @@ class LimitCycle:
 def limit_cycles(
     problem: SelfExcited, curve: Sequence[AmplitudePoint], *, most_harmonics: int = 0, tolerance: float = 1e-5
 ) -> list[LimitCycle]:
-    """Return the limit cycles of a mode, by growing amplitude.
+    """Return the limit cycles of a mode, by ascending amplitude.
 
     Parameters
     ----------
@@ -83,8 +85,8 @@ def limit_cycles(
     curve
         Damping over the amplitude, in the order of the branch.
     most_harmonics
-        Highest harmonic. Harmonics are raised from h to 2 h + 1 while the relative change of the amplitude is above the `tolerance`; below
-        the first number of harmonics: no raise.
+        Highest harmonic. Harmonics are raised from h to 2 h + 1 while amplitude or frequency change by more than `tolerance`. They stay
+        fixed if this is at most the initial number.
     """
     found: list[LimitCycle] = []
     for before, after in crossings(with_extremes(problem, curve)):
@@ -95,13 +97,13 @@ def limit_cycles(
 
 
 def crossings(curve: Sequence[AmplitudePoint]) -> list[tuple[AmplitudePoint, AmplitudePoint]]:
-    """Return the neighbours on a curve between which the damping changes its sign."""
+    """Return the neighbouring points of a curve between which the damping changes its sign."""
     known = [p for p in curve if p.converged]
     return [(a, b) for a, b in pairwise(known) if a.level * b.level <= 0.0 and a.level != b.level]
 
 
 def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list[AmplitudePoint]:
-    """Return the solutions of a curve with extremes of the damping between them: the largest, and those that may lie just beyond zero."""
+    """Add extremes of the damping to the solutions of a curve: the largest one, and others that may lie just beyond zero."""
     known = [p for p in curve if p.converged]
     out, top = known[:1], max((p.level for p in known), default=0.0)
     for i in range(1, len(known) - 1):
@@ -114,7 +116,7 @@ def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list
 
 
 def _extreme(problem: SelfExcited, three: Sequence[AmplitudePoint]) -> AmplitudePoint:
-    """Return the motion of most (least) damping between three of which that in the middle has more (less) than its neighbours."""
+    """Return the motion with extreme damping near the middle one of three, which has more or less damping than both others."""
     upward = -1.0 if three[1].level > three[0].level else 1.0
     best = three[1]
 
@@ -137,7 +139,7 @@ def _extreme(problem: SelfExcited, three: Sequence[AmplitudePoint]) -> Amplitude
 def solve_cycle(
     problem: SelfExcited, start: FloatArray, amplitude: float, omega: float, level: float = 0.0
 ) -> FloatArray | None:
-    """Return the unknowns of a limit cycle from a motion over its amplitude; None where there is none nearby.
+    """Return the unknowns of a limit cycle from a nearby motion; None without convergence.
 
     Parameters
     ----------
@@ -148,7 +150,7 @@ def solve_cycle(
     amplitude, omega
         Initial amplitude, m, and frequency, rad/s.
     level
-        Prescribed damping of the motion; zero for a limit cycle.
+        Prescribed level of damping; zero for a limit cycle.
     """
     equation = problem.limit_cycle()
     guess = np.append(start, [np.log(omega / problem.mode.omega), np.log(amplitude)])
@@ -158,7 +160,7 @@ def solve_cycle(
 
 
 def _between(problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint) -> LimitCycle | None:
-    """Return the cycle between two points: at once, or by less and less damping from either, since slip begins with a corner."""
+    """Return the cycle between two points, directly or by gradual removal of damping from either, since slip begins with a corner."""
     share = before.level / (before.level - after.level)
     y = before.unknowns + share * (after.unknowns - before.unknowns)
     ends = np.log([before.amplitude, after.amplitude])
@@ -177,7 +179,7 @@ def _between(problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint
 
 
 def _undamped(problem: SelfExcited, point: AmplitudePoint) -> FloatArray | None:
-    """Take the damping away from a motion, in as many steps as that needs."""
+    """Remove the damping of a motion in as many steps as needed."""
     level = problem.level(point.level, point.omega)
     known = np.append(point.unknowns[:-1], np.log(point.amplitude))
     left, step = 1.0, 0.5
@@ -194,7 +196,7 @@ def _undamped(problem: SelfExcited, point: AmplitudePoint) -> FloatArray | None:
 
 
 def _refined(problem: SelfExcited, cycle: LimitCycle, most: int, tolerance: float) -> LimitCycle:
-    """Raise the harmonics until the amplitude stays."""
+    """Raise the harmonics until amplitude and frequency converge."""
     while cycle.order < most:
         more = problem.with_order(min(MORE * cycle.order + 1, most))
         start = more.unknowns(cycle.coefficients / cycle.amplitude, cycle.omega, 0.0)[:-2]
@@ -212,7 +214,10 @@ def _refined(problem: SelfExcited, cycle: LimitCycle, most: int, tolerance: floa
 
 
 def _foretold(problem: SelfExcited, y: FloatArray) -> float:
-    """Return the relative change of amplitude or frequency, the larger one, by a Newton step towards the judging set; where a wheel has no such waves infinite."""
+    """Predict the relative change of amplitude or frequency, the larger one, by a Newton step with the judging harmonics.
+
+    The result is infinite if a wheel lacks their waves.
+    """
     wider = problem.judging()
     if wider is None:
         return np.inf
@@ -239,9 +244,9 @@ def _cycle(problem: SelfExcited, y: FloatArray, change: float, *, enough: bool) 
 
 
 def _slope(problem: SelfExcited, cycle: FloatArray) -> float:
-    """Return ``dζ / d ln √E`` along the motions that damping keeps going, at a limit cycle.
+    """Return ``dζ / d ln √E`` along the motions sustained by damping, at a limit cycle.
 
-    The amplitude of one coordinate may fall where the motion grows, as where slip begins; the kinetic energy E of the first harmonic does not.
+    The amplitude of one coordinate may fall while the motion grows, as at the onset of slip; the kinetic energy E of the first harmonic does not.
     """
     y, p = np.append(cycle[:-1], 0.0), float(cycle[-1])
     equation = problem.over_amplitude()
@@ -257,7 +262,7 @@ def _slope(problem: SelfExcited, cycle: FloatArray) -> float:
 
 
 def _energy(problem: SelfExcited, y: FloatArray, log_amplitude: float) -> float:
-    """Return the kinetic energy of the first harmonic, over a factor that all motions share."""
+    """Return the kinetic energy of the first harmonic, up to a constant factor."""
     omega, motion = problem.omega(y), problem.relative(y)
     linear = problem.balance.linear
     moving = linear.recover(omega, motion)[1]
@@ -276,7 +281,7 @@ class CycleStability:
     along
         Multiplier of the disturbance along the cycle. Its exact value is 1, and the difference indicates the error of the motion.
     wave
-        Disturbance of a wheel whose multiplier decides the stability; None for a single structure, and where it is unknown.
+        Disturbance of a wheel with the deciding multiplier; None for a single structure, and if unknown.
     """
 
     stability: Stability
@@ -286,14 +291,14 @@ class CycleStability:
 
 @by_one_thread
 def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
-    """Return the stability of a limit cycle of a problem with as many harmonics.
+    """Return the stability of a limit cycle; the problem has the same harmonics.
 
     The error of each multiplier is its change with half as many harmonics, plus the distance from 1 of the multiplier along the cycle.
 
     Raises
     ------
     InputError
-        If the structure cannot be marched in time, or a wheel has not all its waves.
+        If the structure has no equations in time, or a wheel lacks waves.
     """
     found, along = _of(problem, cycle.unknowns)
     errors = np.full(found.errors.size, np.inf)
@@ -313,7 +318,7 @@ def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
 
 
 def _of(problem: SelfExcited, unknowns: FloatArray) -> tuple[Stability, complex]:
-    """Return the stability without the disturbance along the motion, and the multiplier of this."""
+    """Return the stability without the disturbance along the motion, and the multiplier of this disturbance."""
     own = all_in_time(problem.system, _gaps(problem, unknowns))
     found = stability_in_time(own, problem.omega(unknowns))
     values = found.floquet.multipliers
@@ -341,7 +346,7 @@ def _with_fewer(problem: SelfExcited, cycle: LimitCycle) -> tuple[SelfExcited, F
 
 
 def _changes(found: Floquet, other: Floquet) -> FloatArray:
-    """Return the distance of each multiplier from its partner among others."""
+    """Return the distance of each multiplier from its partner in another solution."""
     left, out = other.multipliers.copy(), np.full(found.multipliers.size, np.inf)
     for i, value in enumerate(found.multipliers):
         if np.all(np.isnan(left)):

@@ -1,4 +1,4 @@
-"""Self-excited vibration in time: the motion that starts near a limit cycle, and the wave of the whole wheel that wins."""
+"""Self-excited vibration in time: motion from near a limit cycle, and the dominant wave of the whole wheel."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,25 +15,25 @@ from stickslip.response.time.settling import last_third, overflowed, period_harm
 from stickslip.response.time.start import TransientStart
 from stickslip.response.time.stepping.marcher import prepared
 
-KEPT = 32  # samples of a period that are kept
-LAST = 4  # periods whose phases tell the frequency
-WINDOW = 16  # periods of a window in which waves are told apart
-SMALL = 1e-2  # of the largest wave: what is below has lost
-STEADY = 1e-2  # relative change of an amplitude over the last third that counts as none
+KEPT = 32  # stored samples in a period
+LAST = 4  # last periods, whose phases give the frequency
+WINDOW = 16  # periods of a window in which waves are separated
+SMALL = 1e-2  # amplitude of a wave over the largest, below which it has decayed
+STEADY = 1e-2  # relative change of an amplitude over the last third, below which it is steady
 
-UNSETTLED = "not settled yet"  # how sentences begin where the periods were too few
+UNSETTLED = "not settled yet"  # beginning of sentences after too few periods
 
 Outcome = Literal["one wave", "several waves", "decays", "grows", "not settled"]
 
 
 @dataclass(frozen=True, eq=False)
 class Marched:
-    """A motion marched over many periods of a frequency.
+    """Motion integrated over many periods of a reference frequency.
 
     Parameters
     ----------
     omega
-        Frequency of the motion, rad/s.
+        Reference frequency, rad/s.
     first
         (periods, n_outputs) complex amplitudes of the first harmonic in each period, m.
     samples
@@ -41,7 +41,7 @@ class Marched:
     final
         State at the end.
     overflowed
-        Whether the motion grew beyond all numbers: the periods end before.
+        Whether the motion overflowed; the stored periods end before.
     """
 
     omega: float
@@ -57,7 +57,7 @@ class Marched:
 
     @property
     def frequency(self) -> FloatArray:
-        """(n_outputs,) frequency at the end, rad/s, by the phase that the last periods gain."""
+        """(n_outputs,) frequency at the end, rad/s, from the phase gain of the last periods."""
         if len(self.first) < 2:
             return np.full(self.first.shape[1], np.nan)
         last = self.first[-min(len(self.first), LAST) :]
@@ -78,24 +78,24 @@ def march_periods(  # noqa: PLR0913
     *,
     settles: float = 0.0,
 ) -> Marched:
-    """Integrate a structure with contacts over `periods` periods of a reference frequency, which need not be that of the motion.
+    """Integrate a structure with contacts over periods of a reference frequency, which may differ from the motion's frequency.
 
     Parameters
     ----------
     structure, contacts, load
         One structure, or all sectors of a wheel.
     omega
-        rad/s.
+        Reference frequency, rad/s.
     outputs
         Reported dofs.
     start
         State at t = 0.
     periods
-        Most periods.
+        Largest number of periods.
     steps
         Steps in a period.
     settles
-        Remaining relative change of the largest amplitude at which the integration ends early; 0: it never does.
+        Estimated remaining relative change of the largest amplitude at which the integration ends early; 0: never.
     """
     steps = -(-steps // KEPT) * KEPT
     marcher = prepared(structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights)
@@ -129,18 +129,18 @@ def march_periods(  # noqa: PLR0913
 
 @dataclass(frozen=True, eq=False)
 class WaveHistory:
-    """The waves of a motion of all sectors, over time.
+    """Waves in a motion of all sectors over time.
 
     Parameters
     ----------
     time
         (windows,) s.
     amplitude
-        (windows, n_s) of each wave number, m, at one place of the sectors.
+        (windows, n_s) amplitude of each wave number at one dof of the sectors, m.
     omega
-        (windows, n_s) frequency of each, rad/s; of no meaning where the wave is small.
+        (windows, n_s) frequency of each wave, rad/s; meaningless for small waves.
     spread
-        (windows, n_s) how much the amplitude of each changes within the window, relative: a beat.
+        (windows, n_s) relative change of each amplitude within the window, such as by beating.
     """
 
     time: FloatArray
@@ -150,7 +150,7 @@ class WaveHistory:
 
     @property
     def waves(self) -> tuple[int, ...]:
-        """Wave numbers that are there at the end, the largest first."""
+        """Wave numbers present at the end, the largest amplitude first."""
         last = self._last
         order = np.argsort(-last, kind="stable")
         return tuple(int(k) for k in order if last[k] > SMALL * last.max(initial=0.0))
@@ -190,10 +190,10 @@ class WaveHistory:
 
 
 def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
-    """Return the waves of a motion from outputs at the same place of all sectors, in their order.
+    """Return the waves of a motion from outputs at the same dof of all sectors, in their order.
 
-    In each window of `window` periods the motion of a wave number is split by the sign of its frequency. Waves k and -k have the same
-    shape at one instant, and travel in opposite directions.
+    In each window of `window` periods, the motion of a wave number is split by the sign of its frequency, since waves k and -k have the same
+    instantaneous shape and travel in opposite directions.
     """
     sectors = marched.samples.shape[1]
     length = window * KEPT
@@ -219,7 +219,7 @@ def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
 
 
 def mixed_start(motions: Sequence[tuple[ComplexArray, float]], like: TransientStart) -> TransientStart:
-    """Return the sum of motions (n,) complex amplitudes and their frequencies, rad/s, at t = 0, with the states of laws of another start."""
+    """Return the state at t = 0 of a sum of motions, given by complex amplitudes (n,) and frequencies, rad/s; law states are taken from `like`."""
     moved = sum((a.real for a, _ in motions), np.zeros_like(like.displacement))
     rate = sum(((1j * omega * a).real for a, omega in motions), np.zeros_like(like.velocity))
     return replace(like, displacement=moved, velocity=rate)

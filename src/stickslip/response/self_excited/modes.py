@@ -16,26 +16,26 @@ from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.response.rotating.flutter import damping_ratio, followed_mode
 from stickslip.response.system import System
 
-WHOLE = 400  # coordinates up to which eigenvalues are those of all motions
-SPARE = 20  # undamped modes beyond twice as many as are asked for
-STILL = 1e-7  # of the fastest rate: what turns more slowly creeps, or is free to move but for rounding
+WHOLE = 400  # coordinates up to which the full eigenvalue problem is solved
+SPARE = 20  # undamped modes in addition to twice the requested number
+STILL = 1e-7  # frequency over the largest eigenvalue, below which a mode creeps or is a rigid body with rounding
 
 
 @dataclass(frozen=True, eq=False)
 class StuckMode:
-    """A mode of the structure in the first harmonic, with stuck contacts.
+    """Mode of the structure in the first harmonic, with stuck contacts.
 
     Parameters
     ----------
     number
-        From 1, by frequency.
+        Number from 1, by frequency.
     omega
         Modulus of the eigenvalue, rad/s.
     ratio
         Damping ratio ``−Re λ / |λ|`` of the eigenvalue with all damping, Coriolis and aerodynamic forces. Negative: the mode grows.
     shape
-        (n,) complex displacement of all coordinates, normalised to unit modal mass; of a wheel whose contacts know a dof in several
-        phases also the forces that hold its copies.
+        (n,) complex displacement of all coordinates, normalised to unit modal mass; for a wheel with copies of dofs in several phases, also
+        the constraint forces of the copies.
     """
 
     number: int
@@ -51,14 +51,14 @@ class StuckMode:
 
 @by_one_thread
 def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> list[StuckMode]:
-    """Return the lowest modes of the structure in the first harmonic; of a wheel, those of the wave that its engine order excites.
+    """Return the lowest modes of the structure in the first harmonic; for a wheel, of the wave excited by its engine order.
 
     Parameters
     ----------
     system
         Structure with contacts.
     count
-        Number of modes; fewer are returned if the structure has fewer, or some do not oscillate.
+        Number of modes; the result has fewer if the structure has fewer, or some do not oscillate.
     holds
         (n_contacts,) contact points that stick under the static loads; None: all.
 
@@ -69,10 +69,9 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
 
     Notes
     -----
-    Eigenvalues of ``λ²M + λC + K`` with all that C and K hold, Coriolis terms and unsymmetric ones of a flow included: undamped modes are
-    other shapes where waves that travel both ways have equal frequencies, or rotation parts them. Aerodynamic coefficients are those of
-    each mode's own frequency. Of more than 400 coordinates the motions are spanned by undamped modes and the static answers to the forces
-    that couple these.
+    Eigenvalues of ``λ²M + λC + K`` include Coriolis terms and unsymmetric aerodynamic terms, since undamped modes have other shapes where
+    rotation separates forward and backward waves, or both have equal frequencies. Aerodynamic coefficients are evaluated at each mode's own
+    frequency. With more than 400 coordinates, the basis consists of undamped modes and of static responses to the forces that couple them.
     """
     springs = system.springs.stuck_stiffness()
     if holds is not None:
@@ -92,16 +91,16 @@ def sprung_modes(
     springs
         (3 n_contacts,) stiffnesses t, w, n of each contact, N/m.
     harmonic
-        Harmonic whose matrices are used: on a wheel the harmonics of a load travel as different waves.
+        Harmonic whose matrices are used; on a wheel, harmonics of a load travel as different waves.
     whole
-        Coordinates up to which eigenvalues are those of all motions.
+        Number of coordinates up to which the full eigenvalue problem is solved.
     """
     if not system.structure.reduced:
         one_structure(system.structure, "stuck_modes")
     own = system.structure.of_harmonic(harmonic)
     bound = with_springs(own, system.interface.gap_operator, springs)
     elastic = replace(bound, stiffness=_hermitian(bound.stiffness), mass=_hermitian(bound.mass))
-    # copies that contacts know, and what holds them, have no mass and are no motions of their own
+    # copies of dofs for contacts, and their constraint forces, have no mass and are no independent coordinates
     way = own_motions(elastic, system.structure.multipliers)
     dofs = elastic.dofs.take(np.arange(way.shape[1]))
     still, free = (in_coordinates(one, way, dofs, {}) for one in (elastic, bound))
@@ -122,7 +121,7 @@ def sprung_modes(
 
 
 def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[Matrix, int]:
-    """Return motions of unit mass that span the lowest modes, and how many of those asked for do not vibrate without damping."""
+    """Return a basis of unit mass for the lowest modes, and the number of requested undamped modes that do not vibrate."""
     moving = int(np.count_nonzero(still.mass.diagonal()))
     wanted = moving if moving <= whole else min(moving, 2 * count + SPARE)
     modes = normal_modes(still, wanted)
@@ -132,7 +131,7 @@ def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[M
         return shapes, rigid
     coupling = free.damping @ shapes * np.sqrt(np.maximum(modes.squares, 0.0))
     coupling = coupling + (free.stiffness - still.stiffness) @ shapes
-    shift = float(np.max(modes.squares)) * 1e-3  # a body that is free to move has a static answer, too
+    shift = float(np.max(modes.squares)) * 1e-3  # a free body has a static response, too
     answers = np.linalg.solve(still.stiffness + shift * still.mass, coupling)
     answers = answers[:, np.any(answers != 0.0, axis=0)]
     both = np.hstack([shapes, answers / np.linalg.norm(answers, axis=0)])
@@ -144,7 +143,7 @@ def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[M
 def _eigenpairs(
     stiffness: Matrix, damping: Matrix, feedback: Feedback | None, count: int
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return eigenvalues and shapes in motions of unit mass, frequency above zero, lowest first."""
+    """Return the lowest eigenvalues with positive frequency, and their shapes, in a basis of unit mass."""
     stiffness, damping = (np.asarray(m, dtype=complex) for m in (stiffness, damping))
     n = len(stiffness)
     zero, one = np.zeros((n, n)), np.eye(n)
@@ -159,7 +158,7 @@ def _eigenpairs(
     stiff, damp = feedback.influence.frozen(feedback.phase_angle, feedback.reference)
 
     def beyond(eigenvalue: complex) -> Matrix:
-        # a table knows the frequency of a motion and not its growth; the matrices hold the frozen form of both
+        # a table depends on the frequency only; the matrices contain the frozen form for frequency and growth
         inner = feedback.force(eigenvalue.imag) - stiff - eigenvalue * damp
         return np.asarray(P @ inner @ P.conj().T)
 
@@ -170,7 +169,7 @@ def _eigenpairs(
 
 
 def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Matrix:
-    """Return shapes with the forces that hold copies, which the contacts pull and no mass does."""
+    """Return shapes with the constraint forces of copied dofs, which balance contact forces only, as copies have no mass."""
     if not multipliers.size:
         return shapes
     copies = multipliers - multipliers.size

@@ -1,14 +1,12 @@
-"""The autonomous periodic problem: its frequency is unknown, and so is the damping that keeps the motion going.
+"""Autonomous periodic problem: the frequency is unknown, and so is the damping that sustains the motion.
 
-The balance has a given amplitude ``a`` of one coordinate in its first harmonic, which is its scale, and the phase of that coordinate is
-zero, since time may begin anywhere. The unknowns beside the motion are ``ln ω`` and a *level*:
+The first harmonic of one coordinate has a given amplitude ``a``, which scales the balance, and zero phase, since the origin of time is
+arbitrary. The additional unknowns are ``ln ω`` and a *level*, which is one of these:
 
-- a damping of so many times the mass, which the motion needs to go on. Where it is zero the motion is a limit cycle (with positive damping
-  of the model it is negative: the extended periodic motion concept of Krack, Computers & Structures 154 (2015) 59-71);
-- any parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
-- the amplitude itself, for the model as it is: the limit cycle.
-
-Contact forces and the dissipation of a motion follow from its gaps.
+- mass-proportional damping that sustains the motion. Where it is zero, the motion is a limit cycle. In a model with positive damping it is
+  negative (the extended periodic motion concept of Krack, Computers & Structures 154 (2015) 59-71);
+- a parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
+- the amplitude itself, for the limit cycle of the given model.
 """
 
 from collections.abc import Callable
@@ -36,15 +34,15 @@ from stickslip.response.system import System
 from stickslip.solve.linear import factorised
 
 WANDERED = 3.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
-FARTHEST = 100.0  # |ln a| beyond which there are no motions
-STILL = 1e-6  # of the largest amplitude of a mode: a coordinate that moves less is none of it
+FARTHEST = 100.0  # largest |ln a|
+STILL = 1e-6  # amplitude of a coordinate over the largest in the mode, below which it does not take part
 SAMPLES_A_HARMONIC = 16
-FAR = 1e6  # m: whatever can slip has slipped there, of a model without dimensions, too
+FAR = 1e6  # m: displacement at which every slider has slipped, also in dimensionless models
 
 
 @dataclass(frozen=True)
 class Held:
-    """Condition: a real part of a coordinate's first harmonic has a given value, in the scale of the problem.
+    """Condition that prescribes the cosine or sine part of a coordinate's first harmonic, in the scale of the problem.
 
     Parameters
     ----------
@@ -76,18 +74,18 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class SelfExcited:
-    """The periodic motions of one mode that nothing drives; `self_excited_motions` makes one.
+    """Unforced periodic motions of one mode; `self_excited_motions` makes one.
 
     Parameters
     ----------
     system, load
         System of structure and contacts, and its static load.
     mode
-        Mode in which the motions begin at small amplitudes.
+        Mode of the motions at small amplitudes.
     how
         Harmonics, samples, solver.
     position
-        Index, among the retained coordinates, of the one whose amplitude is given.
+        Index, among the retained coordinates, of the coordinate with prescribed amplitude.
     balance
         The balance at an amplitude of 1 m.
     """
@@ -100,13 +98,13 @@ class SelfExcited:
     balance: HarmonicBalance
 
     def with_order(self, order: int) -> "SelfExcited":
-        """Return the problem with harmonics up to `order`, which the system must provide."""
+        """Return the problem with harmonics up to `order`; a wheel must have their waves."""
         samples = max(self.how.samples, SAMPLES_A_HARMONIC * order)
         how = replace(self.how, order=order, samples=samples)
         return self_excited_motions(self.system, self.load, self.mode, self.dof, how)
 
     def judging(self) -> "SelfExcited | None":
-        """Return the problem with the judging set of harmonics; None where a wheel lacks these waves."""
+        """Return the problem with the judging set of harmonics; None if a wheel lacks their waves."""
         harmonics = judging_set_of(self.balance)
         try:
             made = self.with_order(harmonics[-1])
@@ -116,7 +114,7 @@ class SelfExcited:
 
     @property
     def dof(self) -> int:
-        """The coordinate whose amplitude is given."""
+        """Coordinate with prescribed amplitude."""
         return int(self.balance.linear.retained[self.position])
 
     def damped(self, level: float) -> HarmonicBalance:
@@ -137,10 +135,10 @@ class SelfExcited:
         *,
         linear_alone: bool = False,
     ) -> PeriodicProblem:
-        """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping.
+        """Return the periodic problem with the parameter ``ln a`` and a level, over `scale`, as the last unknown.
 
-        The conditions `held` on amplitude and phase refer to the coordinate by default. A level that changes linear forces only
-        (`linear_alone`), such as damping, costs no evaluation of contacts.
+        The level is the damping, unless `family` gives the balance of another level. The conditions `held` on amplitude and phase refer to the
+        coordinate by default. A level that changes linear forces only (`linear_alone`), such as damping, costs no evaluation of contacts.
         """
         members = family or self.damped
 
@@ -158,7 +156,7 @@ class SelfExcited:
         return -self.mode.omega * slope
 
     def limit_cycle(self) -> PeriodicProblem:
-        """Return the equation of a motion of given damping, whose last unknown is ``ln a`` and whose parameter is its level: that of a limit cycle is zero."""
+        """Return the periodic problem with ``ln a`` as the last unknown and the level of damping as the parameter, zero for a limit cycle."""
 
         def setting(extra: FloatArray, level: float) -> Setting:
             balance = self.balance if level == 0.0 else self.damped(level)
@@ -167,33 +165,33 @@ class SelfExcited:
         return self._bordered(setting)
 
     def unknowns(self, coefficients: ComplexArray, omega: float, last: float) -> FloatArray:
-        """Return the unknowns of a motion (H+1, n_retained) over its amplitude, its frequency and the last unknown."""
+        """Return the unknowns from a motion (H+1, n_retained) over its amplitude, its frequency, rad/s, and the last unknown."""
         x = replace(self.balance, displacement_scale=1.0).unknowns(coefficients)
         return np.append(x, [np.log(omega / self.mode.omega), last])
 
     def relative(self, y: FloatArray) -> ComplexArray:
-        """Return the (H+1, n_retained) motion of unknowns, over its amplitude."""
+        """Return the (H+1, n_retained) motion over its amplitude from the unknowns."""
         return replace(self.balance, displacement_scale=1.0).coefficients(y[:-2])
 
     def omega(self, y: FloatArray) -> float:
-        """Return the frequency of unknowns, rad/s."""
+        """Return the frequency from the unknowns, rad/s."""
         return self.mode.omega * float(np.exp(y[-2]))
 
     def level(self, ratio: float, omega: float) -> float:
-        """Return the level of damping of a ratio at a frequency, rad/s."""
+        """Return the level of damping for a damping ratio at a frequency, rad/s."""
         return 2.0 * ratio * omega / self.mode.omega
 
     def ratio(self, y: FloatArray) -> float:
-        """Return the damping ratio of a motion whose last unknown is the level of damping."""
+        """Return the damping ratio from unknowns with the level of damping as the last one."""
         return 0.5 * float(y[-1]) * self.mode.omega / self.omega(y)
 
     def at_amplitude(self, balance: HarmonicBalance, log_amplitude: float) -> HarmonicBalance:
-        """Return a balance in the scale of an amplitude."""
+        """Return a balance scaled by an amplitude."""
         a = float(np.exp(log_amplitude))
         return replace(balance, displacement_scale=a, force_scale=a * self.balance.force_scale)
 
     def guess(self, static: FloatArray, amplitude: float) -> FloatArray:
-        """Return the unknowns, over the amplitude, of the mode about a static state (n_retained of the system,)."""
+        """Return the unknowns of the linear mode about a static state (n_retained of the system,) at an amplitude, m."""
         linear = self.balance.linear
         motion = np.zeros((self.balance.order + 1, linear.n), dtype=complex)
         motion[0, np.searchsorted(linear.retained, self.system.retained)] = static / amplitude
@@ -214,7 +212,7 @@ class SelfExcited:
 
 
 def _by_size(state: State) -> FloatArray:
-    """Return the derivative of the equations by the logarithm of the amplitude that is their scale: ``J x - r``, and of the conditions zero."""
+    """Return the derivative by the logarithm of the scaling amplitude: ``J x - r`` for the balance, and zero for the conditions."""
     at = state.at
     return np.append(times(at.jac, state.x) - at.residual, np.zeros(state.extra.size))
 
@@ -223,25 +221,25 @@ def _by_size(state: State) -> FloatArray:
 def self_excited_motions(
     system: System, load: HarmonicLoad, mode: StuckMode, dof: int, how: Discretisation
 ) -> SelfExcited:
-    """Set up the motions of a mode that nothing drives.
+    """Set up the unforced motions of a mode.
 
     Parameters
     ----------
     system
         System with contacts; on a wheel the wave number of the mode is its engine order.
     load
-        Static forces; harmonic ones are none of a self-excited motion.
+        Static forces; harmonic forces are not allowed.
     mode
         One of `stuck_modes`.
     dof
-        The coordinate whose amplitude stands for that of the motion.
+        Coordinate whose amplitude represents the motion.
     how
         Harmonics, samples, solver.
 
     Raises
     ------
     InputError
-        If a contact is rigid, a harmonic load acts, or the coordinate is none of the mode.
+        If a contact is rigid, a harmonic load acts, or the coordinate is at rest in the mode.
     """
     if system.interface.rigid:
         raise input_error(
@@ -265,14 +263,14 @@ def self_excited_motions(
     linear = system.condensed(still, how.order, np.array([dof]))
     some = HarmonicLoad(still.static, {1: np.ones(still.static.size, dtype=complex)})
     balance = harmonic_balance(linear.with_load(some), system.interface, how.order, how.samples, how.evaluator)
-    stiffness = (mode.omega / abs(mode.shape[dof])) ** 2  # of the mode, as its coordinate feels it
+    stiffness = (mode.omega / abs(mode.shape[dof])) ** 2  # modal stiffness for unit amplitude of the coordinate
     balance = replace(balance, linear=linear, displacement_scale=1.0, force_scale=stiffness)
     position = int(np.searchsorted(linear.retained, dof))
     return SelfExcited(system, load, mode, how, position, balance)
 
 
 def levels(problem: SelfExcited, parameter: Parameter, first: float) -> BalanceAt:
-    """Return the balances at 1 m of the values of a parameter; see `branch_in_parameter` for what that may be."""
+    """Return the balances at 1 m as a function of a parameter; see `branch_in_parameter` for its choices."""
     own = problem.balance
 
     def made(system: System, load: HarmonicLoad) -> HarmonicBalance:
@@ -289,12 +287,12 @@ class Contacts:
     Attributes
     ----------
     slipping
-        Share of the contact points that change their state at some time, among those that can slip or open; NaN without such points. A
-        contact with several sliders counts by its share of slipping ones, which is 1 in gross slip only.
+        Share of the contact points that change their state, among the points that can slip or open; NaN without such points. A contact with
+        several sliders counts by its share of slipping sliders, which is 1 in gross slip only.
     sticking
-        Share of these contact points that stick all the time, with several sliders counted in the same way.
+        Share of these contact points that stick throughout, with several sliders counted in the same way.
     open_for
-        Largest share of the period for which a contact point is open.
+        Share of the period for which a contact point is open, the largest over all points.
     """
 
     slipping: float
@@ -303,11 +301,11 @@ class Contacts:
 
 
 def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contacts:
-    """Return slip, stick and opening of the contacts in a motion, from its unknowns over an amplitude, m."""
+    """Return slip, stick and opening of the contacts in a motion of an amplitude, m, from its unknowns."""
     balance = problem.at_amplitude(problem.balance, float(np.log(amplitude)))
     period = balance.contacts(y[:-2], problem.omega(y))
     state, leaves = period.state, leaving(problem.system.interface)
-    # one that stays open does nothing
+    # permanently open contacts do not count as slipping
     slips = np.any(state == SLIP, axis=(1, 2)) | np.any(state != state[:, :, :1], axis=(1, 2))
     stays = np.all(state == STICK, axis=(1, 2))
     moved, stuck = slips.astype(float), stays.astype(float)
@@ -322,7 +320,7 @@ def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contac
 
 @lru_cache(maxsize=8)
 def _sliders(interface: Interface) -> dict[int, FloatArray]:
-    """Return of each contact of several sliders the (n, 2) travels from turn to turn along t and w, m, beyond which they slip."""
+    """Return for each contact with several sliders the (n, 2) peak-to-peak gaps along t and w above which they slip, m."""
     found: dict[int, FloatArray] = {}
     for law in interface.laws:
         if id(law) not in found:
@@ -332,7 +330,7 @@ def _sliders(interface: Interface) -> dict[int, FloatArray]:
 
 
 def _travels(law: ContactLaw) -> FloatArray:
-    """Return the travels of the sliders of a law whose limits are constant, elastic springs left out; of others none."""
+    """Return these peak-to-peak gaps for a law with constant slip limits, without elastic springs; none for other laws."""
     rows = law.elements() if isinstance(law, PiecewiseLinear) else np.zeros((0, UNILATERAL + 1))
     if np.any(rows[:, UNILATERAL]):
         return np.zeros((0, 2))
@@ -343,7 +341,7 @@ def _travels(law: ContactLaw) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def leaving(interface: Interface) -> BoolArray:
-    """Return the contact points (p,) whose law slips or opens at some gap."""
+    """Return whether the law of each contact point (p,) slips or opens at some gap."""
     found: dict[int, bool] = {}
     for law in interface.laws:
         found.setdefault(id(law), _leaves(law))
@@ -353,7 +351,7 @@ def leaving(interface: Interface) -> BoolArray:
 
 
 def _leaves(law: ContactLaw) -> bool:
-    """Return whether a law stops sticking at a large tangential displacement or a large gap."""
+    """Whether a law stops sticking at a large tangential displacement or a large gap."""
     return any(_state(law, gap) for gap in FAR * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]))
 
 
