@@ -1,4 +1,4 @@
-"""Generic numerics for ``F(x, p) = 0``: Newton and continuation; no physics."""
+"""Generic numerics for ``F(x, p) = 0``: Newton's method and continuation, without physics."""
 
 import lazy_loader
 

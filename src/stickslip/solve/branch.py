@@ -1,4 +1,4 @@
-"""Branches of ``F(x, p) = 0``: the equation, its points, distances between them, and options."""
+"""Branches of ``F(x, p) = 0``: the equation, points, lengths, and options."""
 
 import math
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ class Problem(Protocol):
     """An equation with one parameter."""
 
     def linearise(self, x: FloatArray, p: float) -> ParameterEvaluation:
-        """Evaluate everything at (x, p)."""
+        """Evaluate residual and derivatives at (x, p)."""
         ...
 
 
@@ -52,7 +52,7 @@ class Problem(Protocol):
 class StepControl:
     """Step control of a continuation.
 
-    Length is measured in changes of x relative to its own size and in changes of p relative to `scale`.
+    Lengths are changes of x relative to its size, and changes of p relative to `scale`.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class StepControl:
     first, smallest, largest
         Step lengths.
     max_points
-        Number of points after which a branch ends that has not reached its end.
+        Number of points after which a branch ends, even if it has not reached its end.
     growth
         Factor on the step length after a correction with a single Newton step on a nearly straight piece of the branch.
     """
@@ -87,14 +87,17 @@ class Following:
     weights
         (n,) share of each unknown in the length of a step.
     parametrisation
-        Quantity that a step prescribes. ``arc_length``: the distance along the direction of travel (Keller 1977). ``local``: the unknown, or p,
-        that changes most (Rheinboldt & Burkardt 1983). ``natural``: p; the branch ends at a fold with `Status.STEP_TOO_SMALL`.
+        Quantity that a step prescribes. ``arc_length``: the distance along the direction of travel (Keller 1977).
+        ``local``: the unknown, or p, that changes most (Rheinboldt & Burkardt 1983). ``natural``: p; the branch ends at
+        a fold with `Status.STEP_TOO_SMALL`.
     predictor
-        Direction of travel. ``tangent`` costs at most one linear system a point and detects corners and folds at once. ``secant`` through
-        the last two points costs nothing. ``parabola`` adds to the tangent the curvature between the last two points.
+        Direction of travel. ``tangent`` costs at most one linear system per point and detects corners and folds at
+        once. ``secant`` through the last two points costs nothing. ``parabola`` adds the curvature between the last two
+        points to the tangent.
     corrector
-        ``newton``, or ``kept_factors``: Newton steps that reuse factors while they converge, also for the tangent where the branch hardly turned.
-        The latter gives up early, and a shorter step follows; the shortest steps use ``newton``.
+        ``newton``, or ``kept_factors``: Newton steps that reuse factors while they converge; the tangent reuses them if
+        the branch hardly turned. This corrector gives up early, and a shorter step follows; the shortest steps use
+        ``newton``.
     """
 
     newton: Newton
@@ -118,19 +121,20 @@ class Point:
     x, p
         The solution and its parameter.
     tangent
-        (n + 1,) direction of travel, unit length in the measure of the step control; the last entry belongs to p. With the predictor
-        ``secant`` it is the direction from the previous point.
+        (n + 1,) direction of travel, with unit length in the measure of the step control; the last entry is for p. With
+        the predictor ``secant`` it is the direction from the previous point.
     step
         Length of the next step.
     solution
         Result of the corrector; x is a solution only if its status says so.
     orientation
-        Sign of the determinant of the Jacobian bordered by the tangent; it is constant along a path. 0 where it was not computed
-        (secants), NaN where the linear solver gives no determinant.
+        Sign of the determinant of the Jacobian bordered by the tangent; it is constant along a path. 0 if it was not
+        computed (secants), NaN if the linear solver gives no determinant.
     mark
         Name of the event located here; empty for points of regular steps.
     bend
-        (n + 1,) half the change of direction divided by the length of the last step, for the predictor ``parabola``; None where unknown.
+        (n + 1,) half the change of direction divided by the length of the last step, for the predictor ``parabola``;
+        None if unknown.
     """
 
     x: FloatArray
@@ -164,7 +168,7 @@ class Measure:
         return math.sqrt(self.row(vector) @ vector)
 
     def row(self, vector: FloatArray) -> FloatArray:
-        """Return the row (n + 1,) whose product with a second vector is the inner product of both."""
+        """Return the row (n + 1,) whose product with a second vector is their inner product."""
         return self.weights**2 * vector
 
     def cosine(self, a: FloatArray, b: FloatArray) -> float:
@@ -173,7 +177,10 @@ class Measure:
 
 
 def measure_at(x: FloatArray, following: Following) -> Measure:
-    """Return the measure of length near `x`: changes of x relative to its size, changes of p relative to the scale of the step control."""
+    """Return the measure of length near `x`.
+
+    Changes of x are relative to its size, changes of p relative to the scale of the step control.
+    """
     own = following.weights
     weights = np.empty(own.size + 1)
     weights[-1] = 1.0 / following.control.scale
@@ -184,7 +191,7 @@ def measure_at(x: FloatArray, following: Following) -> Measure:
 
 
 def upward(size: int) -> FloatArray:
-    """Return the direction (size,) in which p alone grows."""
+    """Return the direction (size,) of growing p at constant x."""
     direction = np.zeros(size)
     direction[-1] = 1.0
     return direction
@@ -193,7 +200,7 @@ def upward(size: int) -> FloatArray:
 def tangent_at(
     problem: Problem, y: FloatArray, previous: FloatArray, following: Following, at: ParameterEvaluation | None = None
 ) -> tuple[FloatArray, float]:
-    """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined.
+    """Return the unit tangent on the side of `previous` and its orientation; `previous` itself if it is undetermined.
 
     Parameters
     ----------
@@ -206,7 +213,7 @@ def tangent_at(
     following
         Measure of length, and linear solver.
     at
-        The evaluation at `y` where it is known; None: it is made here.
+        The evaluation at `y` if it is known; None: the equation is evaluated.
     """
     measure = measure_at(y[:-1], following)
     if at is None:
@@ -221,7 +228,7 @@ def tangent_at(
 
 @dataclass(eq=False)
 class Latest:
-    """A problem that remembers its latest evaluation: the tangent needs the Jacobian of the last iterate of the corrector.
+    """A problem that remembers its latest evaluation, because the tangent needs the Jacobian of the last iterate.
 
     A corrector does not overwrite the Jacobian of its converged iterate.
     """
@@ -232,7 +239,7 @@ class Latest:
     at: ParameterEvaluation | None = None
 
     def linearise(self, x: FloatArray, p: float) -> ParameterEvaluation:
-        """Evaluate everything at (x, p)."""
+        """Evaluate residual and derivatives at (x, p)."""
         self.x, self.p, self.at = x, p, self.problem.linearise(x, p)
         return self.at
 

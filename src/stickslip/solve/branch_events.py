@@ -21,7 +21,7 @@ class Mark:
     name
         Name, which becomes the `mark` of located points.
     value
-        The function of a point of the branch; the point's tangent is the true one, whatever the predictor.
+        Function of a point of the branch; it gets the point with its true tangent for any predictor.
     tolerance
         Accuracy of the location, a length along the branch.
     """
@@ -32,8 +32,8 @@ class Mark:
 
 
 FOLD = Mark(name="fold", value=lambda point: float(point.tangent[-1]))
-NEIGHBOUR_TOLERANCES = 10.0  # tolerances that the neighbours of a mark may be apart
-HALVINGS = 60  # of the way between them
+NEIGHBOUR_TOLERANCES = 10.0  # largest distance of a mark's neighbours, in tolerances
+HALVINGS = 60  # largest number of chords between the neighbours
 
 
 class _LostError(Exception):
@@ -47,8 +47,8 @@ class _LostError(Exception):
 def located(problem: Problem, before: Point, after: Point, mark: Mark, following: Following) -> Point:
     """Locate an event between two neighbouring points of a branch.
 
-    Points between them are solved on planes normal to the chord, which the branch meets even where it has corners. If the function
-    jumps, as the tangent does at a corner, the location of the jump is found.
+    Points between them are solved on planes normal to the chord, which meet the branch even at corners. If the function
+    jumps, as the tangent does at a corner, the jump is located.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def located(problem: Problem, before: Point, after: Point, mark: Mark, following
     Returns
     -------
     Point
-        The point where the value is zero or jumps, with the name of the event. If the corrector fails in between, a point with the status of the
-        failure and the state before it.
+        The point at which the value is zero or jumps, with the name of the event. If the corrector fails in between, a
+        point with the status of the failure and the state before it.
     """
     spent: list[Solution] = []
     try:
@@ -75,8 +75,8 @@ def located(problem: Problem, before: Point, after: Point, mark: Mark, following
             measure = measure_at(low.x, following)
             if measure.of(high.y - low.y) <= NEIGHBOUR_TOLERANCES * mark.tolerance:
                 break
-            # at a sharp corner planes meet both of its sides, and the neighbours found are far apart: each chord between the last
-            # neighbours cuts off a part that has the corner in it
+            # at a sharp corner, planes meet both of its sides, and the neighbours are far apart: each chord between the
+            # last neighbours cuts off a part that contains the corner
             point = _on_chord(problem, low, high, 0.5, following, spent)
             if np.sign(mark.value(point)) == side:
                 low = point
@@ -90,7 +90,7 @@ def located(problem: Problem, before: Point, after: Point, mark: Mark, following
 def _narrowed(
     problem: Problem, before: Point, after: Point, mark: Mark, following: Following, spent: list[Solution]
 ) -> tuple[Point, Point, Point]:
-    """Look for the mark on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
+    """Search for the mark on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
     known = {0.0: before, 1.0: after}
 
     def value_at(share: float) -> float:
@@ -125,7 +125,7 @@ def _on_chord(
     measure = measure_at(before.x, following)
     chord = after.y - before.y
     length = measure.of(chord)
-    # the condition is a length: a share of the chord would be lost in rounding once the chord is short
+    # the condition is a length: a share of a short chord would be lost in rounding
     row = measure.row(chord / length)
     guess = before.y + share * chord if guess is None else guess
     value = float(row @ before.y) + share * length
@@ -134,7 +134,7 @@ def _on_chord(
     if not solution.status.converged:
         raise _LostError(solution)
     tangent, sign = tangent_at(problem, solution.x, chord / length, following)
-    # beside a sharp corner the chord may point against the direction of travel; the determinant knows
+    # near a sharp corner the chord may point against the direction of travel, which the determinant shows
     if sign * before.orientation < 0.0 < before.orientation * after.orientation:
         tangent, sign = -tangent, -sign
     found = replace(solution, x=solution.x[:-1])
@@ -142,7 +142,7 @@ def _on_chord(
 
 
 def with_tangent(problem: Problem, point: Point, following: Following) -> Point:
-    """Return the point with its true tangent in place of a secant."""
+    """Return the point with its true tangent instead of a secant."""
     if following.predictor == "tangent" or not point.solution.status.converged:
         return point
     tangent, sign = tangent_at(problem, point.y, point.tangent, following)
@@ -152,7 +152,7 @@ def with_tangent(problem: Problem, point: Point, following: Following) -> Point:
 def between(problem: Problem, before: Point, after: Point, marks: Sequence[Mark], following: Following) -> list[Point]:
     """Locate the events between two neighbouring points of a branch; return them in the order of travel.
 
-    A function that changes its sign twice between two points is missed: take shorter steps.
+    A function with two sign changes between the points is missed, unless steps are shorter.
     """
     if not after.solution.status.converged:
         return []

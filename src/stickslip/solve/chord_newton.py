@@ -1,8 +1,8 @@
-"""Newton steps with old factors for as long as they converge, and the last factors for the tangent.
+"""Newton steps that reuse factors while they converge, and reuse of the last factors for the tangent.
 
-After a full Newton step the same factors give further corrections, with Broyden's updates of rank one (Kelley, Solving Nonlinear Equations with
-Newton's Method, SIAM 2003, chapter 4), as long as each is clearly smaller than the one before. Where contacts change their states they are not: then the
-Jacobian is factorised again where the residual is smallest.
+After a full Newton step the same factors give further corrections, with Broyden's updates of rank one (Kelley, Solving
+Nonlinear Equations with Newton's Method, SIAM 2003, chapter 4), while each is clearly smaller than the one before. If
+contacts change their states, they are not. Then the Jacobian is factorised again at the smallest residual.
 """
 
 from dataclasses import dataclass, field
@@ -20,9 +20,9 @@ from stickslip.solve.linear import Dense, Factored, LinearSolver, Reduced, Signe
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
-MAX_CORRECTION_RATIO = 0.5  # part of a correction that the next one by the same factors may be
-MAX_CHORD_STEPS = 7  # corrections by the same factors
-MAX_REFUSED_TRIALS = 2  # trials of one correction after which something else is tried
+MAX_CORRECTION_RATIO = 0.5  # largest ratio of a correction to the previous one with the same factors
+MAX_CHORD_STEPS = 7  # corrections with the same factors
+MAX_REFUSED_TRIALS = 2  # refused trials of a correction, after which the globalisation takes over
 
 
 class KeptFactors:
@@ -33,15 +33,15 @@ class KeptFactors:
     tolerance
         Tolerance of the corrector, at which corrections end.
     then
-        Globalisation that takes over after a few refused trials, or where the Jacobian is not factorised. None: the correction is given up, as a
-        shorter step along a branch costs less.
+        Globalisation that takes over after a few refused trials, or if the Jacobian is not factorised. None: the
+        correction is given up, because a shorter step along a branch costs less.
     known
         Factors of a nearby Jacobian, which are tried first.
 
     Attributes
     ----------
     inverse
-        The last factors, if corrections with them ended at a solution; None before, and where a new Jacobian is needed.
+        The last factors, if corrections with them ended at a solution; None before, and if a new Jacobian is needed.
     """
 
     def __init__(self, tolerance: float, then: Globalisation | None = None, known: Signed | None = None) -> None:
@@ -54,7 +54,7 @@ class KeptFactors:
         self._norms: list[float] = []
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         self.inverse = None
         known, self._known = self._known, None
         step = None if known is None else work.timed(partial(known, -now.at.residual))
@@ -105,15 +105,15 @@ class KeptFactors:
         return best
 
 
-KEPT_FACTORS_RESIDUAL = 1e-4  # part of the residual that a step may leave where its Jacobian is that of the solution
+KEPT_FACTORS_RESIDUAL = 1e-4  # share of the residual that a step may leave if its Jacobian still holds at the solution
 
 
 @dataclass(eq=False)
 class LastFactors:
     """A linear solver that remembers the last factors of an array.
 
-    A full Newton step reduces the residual by the relative change of the Jacobian along the step. Where no contact changes its state,
-    this change is nearly zero, so the factors still serve.
+    A full Newton step reduces the residual by the relative change of the Jacobian along the step. If no contact changes
+    its state, this change is nearly zero, so that the factors are still accurate.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class LastFactors:
     Attributes
     ----------
     inverse
-        The factors; None where there are none.
+        The factors; None if there are none.
     residual
         (n,) residual or its negative at the state of the factors.
     """
@@ -136,7 +136,7 @@ class LastFactors:
         """Solve ``jac x = right``; see `LinearSolver`."""
         if self._factorises(jac):
             return self._solved(jac, right)
-        self.inverse = None  # those of an earlier step are not those of this one
+        self.inverse = None  # factors of an earlier step do not belong to this Jacobian
         return self.linear.solve(jac, right)
 
     def solve_bordered(

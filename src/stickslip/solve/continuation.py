@@ -1,4 +1,4 @@
-"""Continuation of branches of ``F(x, p) = 0`` as a generator of points; by arc length (Keller 1977) by default."""
+"""Continuation of branches of ``F(x, p) = 0`` as a generator of points, by default by arc length (Keller 1977)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 
-STEPS_BETWEEN = 150  # Newton steps on the way from one value of the parameter to another
+STEPS_BETWEEN = 150  # limit of Newton steps from one value of the parameter to another
 
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
@@ -123,7 +123,8 @@ def advance(problem: Problem, point: Point, end: float, following: Following) ->
         spent.append(new.solution)
         if new.solution.status.converged:
             turn = measure.cosine(unit, new.tangent)
-            # a path keeps its orientation: one that changed lies on another sheet, unless the shortest step finds it changed too
+            # orientation is constant along a path: a change means another branch, unless the shortest step shows it,
+            # too
             flipped = new.orientation * point.orientation < 0.0
             if (turn > SHARP_TURN and not flipped) or step < 4 * control.smallest:
                 wanted = next_step(step, new.solution.iterations, abs(turn), control)
@@ -138,21 +139,22 @@ def advance(problem: Problem, point: Point, end: float, following: Following) ->
 
 
 def _with_cost(point: Point, spent: list[Solution], rung: Rung = Rung.FULL_STEPS) -> Point:
-    """Charge a point with all the attempts that led to it."""
+    """Return a point charged with all the attempts that led to it."""
     solution = charged(point.solution, spent)
     return replace(point, solution=replace(solution, rung=max(solution.rung, rung)))
 
 
 def step_to(problem: Problem, point: Point, p: float, following: Following, steps: int = STEPS_BETWEEN) -> Point:
-    """Go from `point`, whose tangent points to growing p, to the value `p`, in one predicted step or else along the branch.
+    """Go from `point`, whose tangent points to growing p, to the value `p`.
 
-    The branch is abandoned after `steps` Newton steps, and where it leads away from `p`.
+    One predicted step is tried first, then the branch is followed. The branch is abandoned after `steps` Newton steps,
+    or if it leads away from `p`.
 
     Returns
     -------
     Point
-        The point at `p`, its tangent pointing to growing p. If neither way converges, a point at `p` with the status and the last
-        iterate of the predicted step.
+        The point at `p`, its tangent pointing to growing p. If neither way converges, a point at `p` with the status
+        and the last iterate of the predicted step.
     """
     if point.p == p:
         return point
@@ -166,7 +168,7 @@ def step_to(problem: Problem, point: Point, p: float, following: Following, step
     last, spent = onward, [direct.solution]
     for last in trace(problem, onward, p, following):
         spent.append(last.solution)
-        # beyond a fold the branch leads away, and what it would reach in the end is another state
+        # after a fold the branch leads away, and would reach `p` only in another state
         if abs(last.p - p) > abs(point.p - p) or sum(s.iterations for s in spent) > steps:
             break
     if last.p != p or not last.solution.status.converged:

@@ -1,4 +1,4 @@
-"""Fallbacks at a fixed parameter: other globalisations, then homotopies, with a limit of Newton steps."""
+"""Fallbacks at a fixed parameter: other globalisations, then homotopies, within a limit of Newton steps."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -16,21 +16,23 @@ from stickslip.solve.status import Rung, Status
 Evaluate = Callable[[FloatArray], Evaluation]
 EvaluateAt = Callable[[float], Evaluate]
 
-STEPS_A_POINT = 300  # Newton steps at one value of the parameter, whatever is tried there,
-SMALL_UNKNOWNS = 60  # with so many unknowns; with more in proportion,
-MAX_BUDGET_FACTOR = 5.0  # up to so many times as many
-PATIENCE = 15  # iterations of a corrector that has no neighbour to start from
+STEPS_A_POINT = 300  # Newton steps at one value of the parameter, for all attempts together,
+SMALL_UNKNOWNS = 60  # up to this number of unknowns; with more unknowns in proportion,
+MAX_BUDGET_FACTOR = 5.0  # up to this factor
+PATIENCE = 15  # iterations of a corrector without a neighbouring solution
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
-ITERATIONS = 6  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
-ROUGH = 1e-5  # scaled residual along a homotopy, whose points are no solutions of anything wanted
-ROOTLESS = 200  # points of the homotopy that needs no physics and may lead nowhere
+ITERATIONS = 6  # of a corrector along a homotopy: a shorter step is cheaper than a long correction
+ROUGH = 1e-5  # scaled residual along a homotopy, whose points need no accuracy
+ROOTLESS = 200  # points of the Newton homotopy, which may lead nowhere
 DIFFERENCE = 1e-6  # change of s for the derivative of a family by s
-MAX_OVERSHOOT = 1e-9  # how far outside 0..1 rounding may carry s
+MAX_OVERSHOOT = 1e-9  # distance from [0, 1] that counts as rounding of s
 
 
 @dataclass(frozen=True, eq=False)
 class Homotopy:
-    """Equations with a parameter from 0 (easy) to 1, followed one after the other by arc length; the last one ends at the equation to solve.
+    """Equations with a parameter from 0 (easy) to 1, followed by arc length one after the other.
+
+    The last one ends at the equation to solve.
 
     Attributes
     ----------
@@ -39,11 +41,13 @@ class Homotopy:
     start
         (n,) a point near the solution of the first leg at its beginning.
     begins
-        Parameters, 0 or little more, at which the first leg may begin. It begins at the first one at which the corrector converges.
+        Parameters, 0 or slightly more, at which the first leg may begin. It begins at the first one at which the
+        corrector converges.
     least
-        Parameter below which a path is abandoned: it runs backwards beyond the only solution of the easy equation.
+        Parameter below which a path is abandoned, because it runs backwards past the only solution of the easy
+        equation.
     max_points
-        Most points of one leg.
+        Largest number of points of one leg.
     """
 
     legs: tuple[Problem, ...]
@@ -54,7 +58,10 @@ class Homotopy:
 
 
 def steps_at_most(unknowns: int, share: float = 1.0) -> int:
-    """Return the limit of Newton steps of all attempts at one parameter value: `share` times 300 up to 60 unknowns, more for more unknowns."""
+    """Return the limit of Newton steps of all attempts at one parameter value.
+
+    It is `share` times 300 up to 60 unknowns, and more for more unknowns.
+    """
     return int(share * STEPS_A_POINT * min(max(unknowns / SMALL_UNKNOWNS, 1.0), MAX_BUDGET_FACTOR))
 
 
@@ -67,35 +74,36 @@ def solve_robustly(
     patience: int = PATIENCE,
     steps: int = 0,
 ) -> Solution:
-    """Solve ``residual(x) = 0`` at a fixed parameter; further methods follow until one converges.
+    """Solve ``residual(x) = 0`` at a fixed parameter by one method after the other, until one converges.
 
-    The order is: the corrector of `options` from each start; each of `homotopies`; the other globalisations, from the start with
-    the smallest residual; the homotopy that needs no physics, ``residual(x) - (1 - s) residual(x_start) = 0``. Shorter
-    continuation steps belong between the first two; `stickslip.solve.continuation.advance` takes them.
+    The order is: the corrector of `options` from each start; each of `homotopies`; the other globalisations, from the
+    start with the smallest residual; the Newton homotopy ``residual(x) - (1 - s) residual(x_start) = 0``, which needs
+    no physics. Shorter continuation steps belong between the first two; `stickslip.solve.continuation.advance` takes
+    them.
 
     Parameters
     ----------
     evaluate
         Residual and Jacobian at a point, as for `newton`.
     starts
-        (n,) starts, at least one; evaluated lazily, none after one that converged.
+        (n,) starts, at least one; they are evaluated lazily, none after one that converged.
     options
         Corrector. A homotopy uses it at each of its steps.
     homotopies
-        From easy equations to this one; evaluated lazily, none after one that converged.
+        From easy equations to this one; they are evaluated lazily, none after one that converged.
     weights
         (n,) share of each unknown in the length of a step of a homotopy; default: equal.
     patience
-        Most iterations of the other globalisations.
+        Largest number of iterations of the other globalisations.
     steps
-        Limit of Newton steps of all attempts together; 0: that of `steps_at_most`.
+        Limit of Newton steps of all attempts together; 0: the limit of `steps_at_most`.
 
     Returns
     -------
     Solution
-        The solution with the cost of all attempts. Its `rung` names the method that converged: `Rung.FULL_STEPS`, `DAMPED_STEP`,
-        `OTHER_GLOBALISATION` or `HOMOTOPY`; ``collections.Counter(s.rung for s in ...)`` counts a sweep. If nothing converges, the
-        attempt with the smallest residual, with its status.
+        The solution with the cost of all attempts. Its `rung` names the method that converged: `Rung.FULL_STEPS`,
+        `DAMPED_STEP`, `OTHER_GLOBALISATION` or `HOMOTOPY`; ``collections.Counter(s.rung for s in ...)`` counts a sweep.
+        If nothing converges, the attempt with the smallest residual, with its status.
 
     Examples
     --------
@@ -148,17 +156,17 @@ def _attempts(
 
 @dataclass(eq=False)
 class _Left:
-    """Newton steps that are left of a budget."""
+    """Remaining Newton steps of a budget."""
 
     steps: int
 
     def after(self, attempt: Solution) -> Solution:
-        """Return an attempt, and count its steps."""
+        """Return an attempt after subtracting its steps."""
         self.steps = max(self.steps - attempt.iterations, 0)
         return attempt
 
     def at_most(self, options: Newton) -> Newton:
-        """Return the corrector with no more steps than are left."""
+        """Return the corrector limited to the remaining steps."""
         return replace(options, max_iterations=max(min(options.max_iterations, self.steps), 1))
 
 
@@ -172,7 +180,7 @@ class _At:
 
 @dataclass(frozen=True, eq=False)
 class ByDifference:
-    """A family of equations as one equation with the parameter s; its derivative by s is a finite difference.
+    """A family of equations as one equation with the parameter s, whose derivative by s is a finite difference.
 
     Attributes
     ----------
@@ -195,7 +203,7 @@ class ByDifference:
 
 @dataclass(frozen=True, eq=False)
 class _Relaxed:
-    """The equation with a share 1 - s of its residual at the start taken away (Newton homotopy)."""
+    """The equation minus the share 1 - s of its residual at the start (Newton homotopy)."""
 
     evaluate: Evaluate
     start: FloatArray
@@ -206,7 +214,7 @@ class _Relaxed:
 
 
 def _followed(homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: FloatArray, steps: int) -> Solution:
-    """Follow a homotopy roughly to the end of its last leg, and solve there, within so many Newton steps."""
+    """Follow a homotopy roughly to the end of its last leg, and solve there, within `steps` Newton steps."""
     rough = replace(
         options, max_iterations=min(options.max_iterations, ITERATIONS), tolerance=max(options.tolerance, ROUGH)
     )
@@ -229,7 +237,7 @@ def _followed(homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: 
     elif solution.status.converged:
         solution = replace(solution, status=Status.TOO_MANY_ITERATIONS)
     if not solution.status.converged:
-        # what a failed step left is no measure of how near s = 1 is
+        # the residual after a failed step says nothing about the distance to s = 1
         norm = float(np.max(np.abs(evaluate(point.x).residual)))
         solution = replace(solution, x=point.x, residual_norm=norm)
     return replace(charged(solution, spent), rung=Rung.HOMOTOPY)
@@ -238,7 +246,7 @@ def _followed(homotopy: Homotopy, evaluate: Evaluate, options: Newton, weights: 
 def _begun(
     leg: Problem, x: FloatArray, begins: tuple[float, ...], following: Following, spent: list[Solution]
 ) -> Point:
-    """Return the first point of a leg, or the last attempt at one."""
+    """Return the first point of a leg, or the last attempt to find it."""
     for begin in begins:
         point = start_point(leg, x, begin, following)
         spent.append(point.solution)
@@ -250,7 +258,7 @@ def _begun(
 def _to_the_end(
     leg: Problem, start: Point, least: float, following: Following, spent: list[Solution], steps: int
 ) -> Point:
-    """Follow a leg from `start` until p = 1, p < `least`, no step converges, or so many Newton `steps` are spent."""
+    """Follow a leg from `start` until p = 1, p < `least`, no step converges, or `steps` Newton steps are spent."""
     point = start
     if not start.solution.status.converged:
         return start

@@ -1,4 +1,4 @@
-"""Iterates of the correctors: their work, and the step from one to the next."""
+"""Iterates of the correctors: cost of evaluations, and steps to the next iterate."""
 
 import math
 from collections.abc import Callable
@@ -13,13 +13,13 @@ from stickslip.operators import Jacobian
 from stickslip.solve.linear import LinearSolver, solve_with, whole_array
 from stickslip.solve.status import Status
 
-ROUNDED_COLUMN = 1e-15  # norm of a column over the largest, below which it is rounding
+ROUNDED_COLUMN = 1e-15  # norm of a column, relative to the largest, below which it is rounding
 EPS = float(np.finfo(float).eps)
-PROBED_ULPS = 4.0  # digits that are changed, in units of the last
-PROBES = 6  # changes of the last digits that are tried
-ROUNDING = 2.0  # times the largest change they make, which is still rounding
-FAR = 1e3  # times that change, which is not asked for again until the residual has fallen to a tenth
-MAX_ROUNDING_RESIDUAL = 1e-4  # residual that is not called rounding, whatever the last digits do
+PROBED_ULPS = 4.0  # change of the last digits, in units of the last one
+PROBES = 6  # number of such changes
+ROUNDING = 2.0  # times the largest resulting change: residuals below are rounding
+FAR = 1e3  # times that change: larger residuals are probed again only after a reduction to a tenth
+MAX_ROUNDING_RESIDUAL = 1e-4  # largest residual that may count as rounding
 
 
 class Evaluation(Protocol):
@@ -60,9 +60,9 @@ class Work:
     linear: LinearSolver
     seconds_contact: float = 0.0
     seconds_linear: float = 0.0
-    rejected: int = 0  # trials that were evaluated and not accepted
-    noise: float = 0.0  # largest change of the residual that last digits were seen to make
-    probed: float = np.inf  # residual at which they were last changed
+    rejected: int = 0  # evaluated trials that were not accepted
+    noise: float = 0.0  # largest change of the residual by a change of the last digits
+    probed: float = np.inf  # residual at the last such change
 
     def at(self, x: FloatArray) -> Iterate:
         """Evaluate at `x`."""
@@ -73,12 +73,12 @@ class Work:
     def rounded(self, now: Iterate) -> bool:
         """Whether a residual is at the level of rounding of the unknowns.
 
-        The last digits of the unknowns are changed at random, which changes the residual: by the stiffness of a contact times the rounding of a
-        gap, where that exceeds the tolerance. No step can make the residual smaller than that.
+        The last digits of the unknowns are changed at random, and the residual changes by the stiffness of a contact
+        times the rounding error of a gap. No step can make the residual smaller than that.
         """
         if not now.norm <= MAX_ROUNDING_RESIDUAL:
             return False
-        if now.norm > max(0.1 * self.probed, FAR * self.noise):  # asked not long ago, and far from it
+        if now.norm > max(0.1 * self.probed, FAR * self.noise):  # probed recently, and far from rounding
             return False
         self.probed = now.norm
         digits = np.random.default_rng(0)
@@ -99,13 +99,16 @@ class Work:
         start = perf_counter()
         step = solve()
         self.seconds_linear += perf_counter() - start
-        # a square that is finite has finite entries alone; one that overflows may have, too
+        # a finite square implies finite entries; an overflowing square does not exclude them
         finite = step is not None and (math.isfinite(step.dot(step)) or np.isfinite(step).all())
         return step if finite else None
 
 
 class Globalisation(Protocol):
-    """Choice of direction and length of steps. An instance serves one correction and keeps its state between iterates."""
+    """Choice of direction and length of steps.
+
+    An instance is for one correction and keeps its state between iterates.
+    """
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
         """Return the next iterate, or the status that ends the iteration."""
@@ -113,10 +116,11 @@ class Globalisation(Protocol):
 
 
 def column_scale(jac: Jacobian, before: FloatArray | None) -> FloatArray:
-    """Return the scale (n,) that makes lengths of steps independent of units: the largest norm each column has had (Moré 1978).
+    """Return the scale (n,) that makes lengths of steps independent of units (Moré 1978).
 
-    The scale is one for a large Jacobian known by its products only, and for columns of zeros or of rounding, whose unknowns nothing
-    determines: a step scaled by rounding would have any length.
+    It is the largest norm of each column so far. The scale is one for a large Jacobian known by its products only, and
+    for columns that are zero or rounding, whose unknowns are undetermined: a step scaled by rounding could have any
+    length.
     """
     norms = np.sqrt(_column_squares(jac))
     if before is not None:
@@ -131,6 +135,6 @@ def _column_squares(jac: Jacobian) -> FloatArray:
 
 
 def squared_ratio(residual: FloatArray, size: float) -> float:
-    """Return ``|residual|² / size²``; infinite where it overflows."""
+    """Return ``|residual|² / size²``; infinite on overflow."""
     ratio = float(np.linalg.norm(residual)) / size
     return ratio * ratio

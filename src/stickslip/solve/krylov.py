@@ -1,8 +1,9 @@
-"""Linear systems given by products: preconditioned Krylov methods, and the choice between these and LU.
+"""Preconditioned Krylov methods for linear systems known by products, and the choice between these and LU.
 
-A system ``J x = b`` is solved as ``(J P⁻¹) y = b, x = P⁻¹ y``: preconditioned from the right, so that the residual that is made small is the
-one that Newton sees. GMRES (Saad & Schultz 1986) is the package's own: SciPy's orthogonalises a new vector against one other at a time, in
-Python, and for systems whose product takes a tenth of a millisecond that is more than half of the time.
+A system ``J x = b`` is solved as ``(J P⁻¹) y = b, x = P⁻¹ y``. This is preconditioning from the right, so that the
+minimised residual is the residual of Newton's method. GMRES (Saad & Schultz 1986) is the package's own: SciPy
+orthogonalises a new vector against one other at a time in Python, which takes more than half of the time if a product
+takes a tenth of a millisecond.
 """
 
 from collections.abc import Callable
@@ -22,14 +23,14 @@ from stickslip.solve.linear import MAX_ARRAY_UNKNOWNS, Assembled, Assembling, De
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
-MAX_ITERATION_GROWTH = 2.0  # growth of the iterations at which a preconditioner is made anew ...
-MIN_WORN_ITERATIONS = 12  # ... though not below that many iterations, which cost less than new factors
-GAIN = 0.1  # share of the residual of a bordered system above which another correction does not help
-CREDIT = 4.0  # arrays that systems which were cheap by products pay for
-PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first time, and at most
-MIN_PRODUCTS = 8  # products that are tried
-COARSE = 1e-4  # tolerance above which rounding is no part of what is left
-ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
+MAX_ITERATION_GROWTH = 2.0  # growth of the iterations at which a new preconditioner is made ...
+MIN_WORN_ITERATIONS = 12  # ... unless there are fewer iterations than this, which cost less than new factors
+GAIN = 0.1  # share of the residual of a bordered system above which a further correction does not help
+CREDIT = 4.0  # largest credit from systems that were cheaper by products, in costs of an array
+PAUSES = (4, 64)  # systems that are factorised before products are tried again: the first and the largest number
+MIN_PRODUCTS = 8  # smallest limit of products in a trial
+COARSE = 1e-4  # tolerance above which rounding does not matter
+ROUNDING = 2.0  # factor on the tolerance for the rounding of the product that computes the residual
 
 
 class Preconditioned(JacobianOperator, Protocol):
@@ -37,7 +38,7 @@ class Preconditioned(JacobianOperator, Protocol):
 
     @property
     def problem(self) -> object:
-        """Equation of this Jacobian; a preconditioner of one of its Jacobians serves the others."""
+        """Key of the equation; Jacobians with the same key can share a preconditioner."""
         ...
 
     def preconditioner(self) -> object | None:
@@ -45,7 +46,10 @@ class Preconditioned(JacobianOperator, Protocol):
         ...
 
     def preconditioned_by(self, kept: object) -> tuple[Solve, Product]:
-        """Return the solver of ``P x = y``, P made of the `kept` part and this Jacobian, and ``J v`` as a function of v and ``P v``."""
+        """Return the solver of ``P x = y``, and ``J v`` as a function of v and ``P v``.
+
+        P consists of the `kept` part and this Jacobian.
+        """
         ...
 
 
@@ -58,7 +62,7 @@ class Graded(Preconditioned, Protocol):
 
 
 class Either(Preconditioned, Assembling, Protocol):
-    """A Jacobian that can be solved for by products or as an array."""
+    """A Jacobian for which systems can be solved by products or as an array."""
 
 
 def is_preconditioned(jac: Jacobian) -> TypeGuard[Preconditioned]:
@@ -67,7 +71,7 @@ def is_preconditioned(jac: Jacobian) -> TypeGuard[Preconditioned]:
 
 
 def is_either(jac: Jacobian) -> TypeGuard[Either]:
-    """Whether a Jacobian can be solved for by products or as an array."""
+    """Whether systems with a Jacobian can be solved by products or as an array."""
     return is_preconditioned(jac) and is_assembling(jac)
 
 
@@ -88,7 +92,7 @@ class KrylovCounts:
 
 @dataclass(eq=False)
 class _Kept:
-    """A preconditioner, the products that its first system took for each digit, and whether it takes many more by now."""
+    """A preconditioner, its initial number of products per digit, and whether it takes many more now (worn)."""
 
     preconditioner: object
     rate: float = 0.0
@@ -105,21 +109,25 @@ class _Kept:
 class Krylov:
     """Preconditioned GMRES or BiCGStab for Jacobians known by their products.
 
-    A preconditioner serves the next Jacobians of the same problem until the iteration takes twice as many products as with the first
-    Jacobian.
+    A preconditioner is reused for Jacobians of the same problem until the iteration takes twice as many products as
+    with the first one.
 
     Parameters
     ----------
     method
-        ``gmres`` (Saad & Schultz 1986) without restart, or ``bicgstab`` (van der Vorst 1992), which keeps fewer vectors.
+        ``gmres`` (Saad & Schultz 1986) without restart, or ``bicgstab`` (van der Vorst 1992), which keeps fewer
+        vectors.
     tolerance
-        Residual of a Newton step relative to the right side: an inexact Newton method (Dembo, Eisenstat & Steihaug 1982).
+        Residual of a Newton step relative to the right side: an inexact Newton method (Dembo, Eisenstat & Steihaug
+        1982).
     tangent_tolerance
-        The same for the tangent of a branch, whose right side is zero except in the border; the smaller one of this and `tolerance` counts.
+        The same for the tangent of a branch, whose right side is zero except in the border; the smaller one of this and
+        `tolerance` applies.
     max_products
         Largest number of products with the Jacobian in one system.
     lenient
-        Whether the result after so many products is accepted if its relative residual is below the square root of the tolerance.
+        Whether the result after so many products is accepted if its relative residual is below the square root of the
+        tolerance.
     counts
         Work so far.
     memory
@@ -138,7 +146,7 @@ class Krylov:
         check_choice("Krylov.method", self.method, ("gmres", "bicgstab"))
 
     def __reduce__(self) -> tuple["partial[Krylov]", tuple[()]]:
-        """Pickle the options alone: preconditioners belong to the problems of one process."""
+        """Pickle only the options: preconditioners belong to the problems of one process."""
         options = ("method", "tolerance", "tangent_tolerance", "max_products", "lenient")
         return partial(Krylov, **{name: getattr(self, name) for name in options}), ()
 
@@ -157,7 +165,7 @@ class Krylov:
         return self._solve(whole, right, tolerance), np.nan
 
     def _solve(self, jac: Jacobian, right: FloatArray, tolerance: float) -> FloatArray | None:
-        """Solve with the preconditioner that is kept, and with a new one if that fails or is worn."""
+        """Solve with the kept preconditioner, and with a new one if it fails or is worn."""
         jac = jac.flat if isinstance(jac, Bordered) else jac
         inside = _preconditioned(jac.jac if isinstance(jac, Bordered) else jac)
         self.counts.systems += 1
@@ -168,7 +176,7 @@ class Krylov:
             solution, left = self._refined(jac, kept, right, tolerance)
             if left <= tolerance:
                 return solution
-        # the old factors go before the new ones come: they are most of what a large problem holds
+        # delete old factors before making new ones: they take most of the memory of a large problem
         self.memory.pop(inside.problem, None)
         made = inside.preconditioner()
         while made is not None:
@@ -182,11 +190,11 @@ class Krylov:
         return None
 
     def _refined(self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-        """Return a solution and its relative residual, which is `tolerance` where that was reached.
+        """Return a solution and its relative residual, which is `tolerance` if that was reached.
 
-        A preconditioner in single precision is linear to that precision only, and inside a border a matrix may be singular, and its
-        preconditioner with it, so that large numbers cancel in every product. The iteration then ends at that rounding: what the
-        residual of its solution asks for is added as long as that helps.
+        A preconditioner in single precision is linear only to that precision. Inside a border, a matrix and its
+        preconditioner may be singular, so that large numbers cancel in every product. The iteration then ends at this
+        level of rounding, and corrections from the true residual are added as long as they help.
         """
         before = self.counts.products
         solution, left = self._iterate(jac, kept, right, tolerance)
@@ -206,7 +214,7 @@ class Krylov:
             solution = solution + self._iterate(jac, kept, rest, tolerance / left)[0]
 
     def _iterate(self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-        """Return a solution and the relative residual that the iteration left, `tolerance` where that was reached."""
+        """Return a solution and the relative residual of the iteration, which is `tolerance` if that was reached."""
         system = _system(jac, kept.preconditioner)
 
         def product(y: FloatArray) -> FloatArray:
@@ -226,14 +234,14 @@ class Krylov:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """The operations of a Krylov method: solution with the preconditioner, and product with the matrix after it."""
+    """The operations of a Krylov method: solution with the preconditioner, and subsequent product with the matrix."""
 
     precondition: Callable[[FloatArray], FloatArray]
     product: Callable[[FloatArray], FloatArray]
 
 
 def _system(jac: Jacobian, kept: object) -> _System:
-    """Put the borders of the matrix around the preconditioner too, where they are eliminated."""
+    """Add the borders of the matrix to the preconditioner, too, by elimination."""
     if not isinstance(jac, Bordered):
         solve, after = _preconditioned(jac).preconditioned_by(kept)
         return _System(solve, lambda y: after(solve(y), y))
@@ -258,7 +266,7 @@ def _system(jac: Jacobian, kept: object) -> _System:
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:
-    """Return the inverse; for a zero singular value any number will do, since the matrix is an approximation."""
+    """Return the inverse, with an arbitrary value for zero singular values: the matrix is an approximation."""
     if matrix.shape == (1, 1):
         return 1.0 / np.where(matrix == 0.0, 1.0, matrix)
     left, sizes, right = np.linalg.svd(matrix)
@@ -277,12 +285,12 @@ def _preconditioned(jac: Jacobian) -> Preconditioned:
 
 @dataclass(eq=False)
 class _Account:
-    """How systems of a problem turned out by products, and how many of the next ones are factorised.
+    """Cost of the systems of a problem by products, and number of next systems to be factorised.
 
     Attributes
     ----------
     debt
-        Seconds that products took beyond what arrays would have, as `Costs` has them; negative where they took less.
+        Additional seconds of products compared with arrays, estimated by `Costs`; negative if products took less.
     arrays
         Systems to be factorised before products are tried again.
     pause
@@ -308,11 +316,11 @@ _By = Callable[[LinearSolver, Jacobian], tuple[FloatArray | None, float]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Automatic:
-    """LU for a Jacobian that is an array; for one known by its products a Krylov method, or LU where that has cost less.
+    """LU for a Jacobian that is an array; for one known by its products, a Krylov method or LU, whichever cost less.
 
-    Products are counted, not timed, so that every run makes the same choices; `Costs` estimates the time of a product and of an array.
-    An array of few unknowns, as where contacts stick, is factorised at once. If a Krylov method costs more than an array, or finds no
-    solution, LU solves some systems of the same problem, and then the Krylov method is tried again.
+    Products are counted, not timed, so that every run makes the same choices; `Costs` estimates the time of a product
+    and of an array. A small array, as with stuck contacts, is factorised at once. If a Krylov method costs more than an
+    array, or finds no solution, LU solves some systems of the same problem before the Krylov method is tried again.
 
     Parameters
     ----------
@@ -327,7 +335,7 @@ class Automatic:
     accounts: "WeakKeyDictionary[object, dict[float, _Account]]" = field(default_factory=WeakKeyDictionary, repr=False)
 
     def __reduce__(self) -> tuple["partial[Automatic]", tuple[()]]:
-        """Pickle the solvers alone: costs so far belong to the problems of one process."""
+        """Pickle only the solvers: costs so far belong to the problems of one process."""
         return partial(Automatic, dense=self.dense, krylov=self.krylov), ()
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
@@ -345,7 +353,7 @@ class Automatic:
         return self._solve(jac, by)
 
     def _solve(self, jac: Jacobian, by: _By) -> tuple[FloatArray | None, float]:
-        """Solve `by` the solver that costs less."""
+        """Solve `by` the cheaper solver."""
         if array_of(jac) is not None:
             return by(self.dense, jac)
         inside = jac.flat.jac if isinstance(jac, Bordered) else jac
@@ -359,7 +367,7 @@ class Automatic:
                 return by(Assembled(self.dense), jac)
         counts, before = self.krylov.counts, replace(self.krylov.counts)
         krylov = self.krylov
-        if within:  # as long as it is worth it: there is another way
+        if within:  # limited to the cost of an array, which is the alternative
             worth = max(int(costs.array / costs.product), MIN_PRODUCTS)
             krylov = replace(krylov, max_products=min(krylov.max_products, worth), lenient=False)
         found = by(krylov, jac)
@@ -373,7 +381,7 @@ class Automatic:
 
 
 def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:
-    """Return `linear` with another relative tolerance, which LU does not need. Preconditioners and counts are shared."""
+    """Return `linear` with another relative tolerance, which LU ignores. Preconditioners and counts are shared."""
     if isinstance(linear, Krylov):
         return replace(linear, tolerance=tolerance)
     if isinstance(linear, Automatic):
@@ -409,7 +417,7 @@ def gmres(
     basis = np.empty((most + 1, right.size))
     basis[0] = right / size
     triangle = np.zeros((most, most))
-    turns = np.eye(most + 1)  # the product of all rotations that made the Hessenberg matrix a triangle
+    turns = np.eye(most + 1)  # product of all rotations that made the Hessenberg matrix triangular
     rest = np.zeros(most + 1)
     rest[0] = 1.0
     count = 0
@@ -417,7 +425,7 @@ def gmres(
         before = basis[: count + 1]
         new = product(basis[count])
         column = np.zeros(count + 2)
-        for _ in range(2):  # once more: the first time leaves its rounding
+        for _ in range(2):  # twice: the first pass leaves rounding errors
             share = before @ new
             new = new - share @ before
             column[:-1] += share

@@ -1,4 +1,4 @@
-"""Newton steps shortened until the residual or the next correction is smaller, and steps past kinks where every shortened step fails."""
+"""Newton steps shortened until the residual or the next correction decreases, and steps past kinks."""
 
 from functools import partial
 from time import perf_counter
@@ -11,10 +11,10 @@ from stickslip.solve.linear import factorised
 from stickslip.solve.status import Status
 
 SHARES = tuple(0.5**k for k in range(31))  # of a Newton step, longest first
-CREEP = 1.01  # by how much the residual may grow on the far side of a kink
-MAX_CREEP_SHARE = 1.0 / 64.0  # share of a Newton step from which on that is allowed
-MAX_IDLE_CROSSINGS = 10  # crossings in a row without a smaller residual than any before
-SLOW_REDUCTION = 0.9  # share of the residual left by a step that hardly helped: usually one that ends at a kink
+CREEP = 1.01  # largest growth of the residual on the far side of a kink
+MAX_CREEP_SHARE = 1.0 / 64.0  # share of a Newton step up to which this growth is allowed
+MAX_IDLE_CROSSINGS = 10  # consecutive crossings without a new smallest residual
+SLOW_REDUCTION = 0.9  # share of the residual after a step that hardly helped, usually because it ends at a kink
 
 
 def slow(after: Iterate, before: Iterate) -> bool:
@@ -24,12 +24,13 @@ def slow(after: Iterate, before: Iterate) -> bool:
 
 
 class Kinks:
-    """Steps to just beyond the next kink, while the residual falls over a few crossings.
+    """Steps to just beyond the next kink, as long as the residual decreases within a few crossings.
 
-    Where contact states switch, the residual grows along the Newton direction from the kink on. There the Jacobian of the far
-    side must take over, so a trial just beyond the kink is accepted although the residual grew a little. Where the
-    determinants of both sides have the same sign, the Newton direction of the far side leads away from the kink and not back (Ralph
-    1994, for piecewise smooth equations); a piecewise linear equation is then solved piece by piece (Katzenelson 1965).
+    Where contact states change, the residual grows along the Newton direction beyond the kink. The Jacobian of the far
+    side must take over there, so a trial just beyond the kink is accepted although the residual grew a little. If the
+    determinants of both sides have the same sign, the Newton direction of the far side leads away from the kink and not
+    back (Ralph 1994, for piecewise smooth equations). A piecewise linear equation is thus solved piece by piece
+    (Katzenelson 1965).
     """
 
     def __init__(self) -> None:
@@ -37,7 +38,7 @@ class Kinks:
         self._idle = 0
 
     def cross(self, work: Work, now: Iterate, step: FloatArray) -> Iterate | Status:
-        """Go along a Newton step until just beyond the next kink.
+        """Go along a Newton step to just beyond the next kink.
 
         Parameters
         ----------
@@ -51,8 +52,8 @@ class Kinks:
         Returns
         -------
         Iterate or Status
-            An iterate with a smaller residual, or just beyond the kink; `Status.STALLED` if there is neither, or if the last few
-            crossings did not reduce the residual.
+            An iterate with a smaller residual, or just beyond the kink; `Status.STALLED` if there is neither, or if the
+            last few crossings did not reduce the residual.
         """
         size = float(np.linalg.norm(now.at.residual))
         self._idle = 0 if size < self._best else self._idle + 1
@@ -68,15 +69,16 @@ class Kinks:
         return Status.STALLED
 
 
-MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step before kinks are stepped across
-MEMORY = 3  # residual norms a step is compared with: kinks make single increases normal
+MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step before kinks are crossed
+MEMORY = 3  # residual norms to which a step is compared: at kinks single increases are normal
 
 
 class LineSearch:
     """Non-monotone line search along Newton steps (after Grippo et al. 1986).
 
-    A step is shortened until the residual norm falls below the largest of the last few, because contacts that switch their state raise the norm
-    for one step on the way to the solution. If no length suffices, the next steps go from kink to kink; see `Kinks`.
+    A step is shortened until the residual norm is below the largest of the last few, because contacts that change their
+    state raise the norm for one step on the way to the solution. If no length suffices, the next steps go from kink to
+    kink; see `Kinks`.
     """
 
     def __init__(self) -> None:
@@ -85,7 +87,7 @@ class LineSearch:
         self._kinks = Kinks()
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         self._norms = [*self._norms[1 - MEMORY :], now.norm]
         step = work.newton_step(now)
         if step is None:
@@ -101,27 +103,29 @@ class LineSearch:
         return self._kinks.cross(work, now, step)
 
 
-MIN_NATURAL_STEP = 1.0 / 32.0  # shortest share of a Newton step; it is taken, across a kink
-GAIN = 0.25  # part of the share by which the next correction has to be smaller
-NATURAL_PATIENCE = 3  # shortest steps in a row, none of which helped, before the search is given up
+MIN_NATURAL_STEP = 1.0 / 32.0  # shortest share of a Newton step, which is accepted across a kink
+GAIN = 0.25  # required relative decrease of the next correction, as a part of the share
+NATURAL_PATIENCE = 3  # consecutive shortest steps without success before the search is given up
 
 
 class NaturalLevel:
     """Damped Newton steps with the natural monotonicity test (Deuflhard 2004, section 3.3).
 
-    A step is measured by the correction that the same factors give at its end, and not by the residual there. A contact that changes its
-    state raises the residual by the stiffness of the contact times the motion, however near the solution is; a correction is the
-    distance to the solution itself. Each trial costs a back substitution. If even the shortest step fails the test,
-    a kink lies within it, and the far side has its own Jacobian: the step is accepted. The iteration stops after a few such steps in a row.
+    A step is judged by the correction that the same factors give at its end, not by the residual. A contact that
+    changes its state raises the residual by the stiffness of the contact times the motion, even close to the solution,
+    whereas a correction is the distance to the solution itself. Each trial costs a back substitution. If even the
+    shortest step fails the test, it crosses a kink, and the far side has its own Jacobian: the step is accepted. The
+    iteration stops after a few such steps in a row.
 
-    Use it for starts near a solution. From far away, or where the Jacobian is nearly singular, the other globalisations converge more often.
+    Use it for starts near a solution. From far away, or if the Jacobian is nearly singular, the other globalisations
+    converge more often.
     """
 
     def __init__(self) -> None:
         self._failed = 0
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         began = perf_counter()
         solve = factorised(work.linear, now.at.jac)
         work.seconds_linear += perf_counter() - began

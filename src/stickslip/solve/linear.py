@@ -1,4 +1,4 @@
-"""Protocol of the linear solvers, the dense solver, and LU factors of arrays and of the Schur complement of a Jacobian."""
+"""Protocol of the linear solvers, the dense solver, and LU factors of arrays and Schur complements."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,9 +23,10 @@ from stickslip.operators import (
     transpose_of,
 )
 
-SOLUTIONS, PRODUCTS = (5, 10)  # that follow where a matrix is to be factorised, and products of each by a Krylov method
-MAX_ARRAY_UNKNOWNS = 8000  # unknowns of an array, which then takes half a GB
-SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
+# assumed number of solutions with a factorised matrix, and of products of each by a Krylov method
+SOLUTIONS, PRODUCTS = (5, 10)
+MAX_ARRAY_UNKNOWNS = 8000  # largest array, about half a GB
+SINGULAR = 1e-15  # ratio of smallest to largest pivot below which a matrix has no usable inverse
 
 
 class Assembling(JacobianOperator, Protocol):
@@ -42,7 +43,10 @@ class Assembling(JacobianOperator, Protocol):
 
 
 def is_assembling(jac: Jacobian) -> TypeGuard[Assembling]:
-    """Whether a Jacobian known by its products can be assembled as an array; `isinstance` of a protocol would take longer than a small system."""
+    """Whether a Jacobian known by its products can be assembled as an array.
+
+    `isinstance` with a protocol would take longer than solving a small system.
+    """
     return hasattr(type(jac), "dense")
 
 
@@ -85,7 +89,7 @@ class LinearSolver(Protocol):
         Parameters
         ----------
         jac
-            (n, n) Jacobian; it is left as it is.
+            (n, n) Jacobian; it is not changed.
         column, row, corner
             (n,), (n,) and a number, or (n, m), (m, n) and (m, m): the border.
         right
@@ -96,7 +100,7 @@ class LinearSolver(Protocol):
         solution
             (n + m,) solution; None if the bordered matrix is singular or no solution was found.
         sign
-            Sign of the determinant of the bordered matrix, 0 if it is singular, NaN where the solver cannot tell.
+            Sign of the determinant of the bordered matrix, 0 if it is singular, NaN if the solver gives no sign.
         """
         ...
 
@@ -120,7 +124,11 @@ class Dense:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """LU of a Jacobian known by its products: of its Schur complement where cheap unknowns can be eliminated, else of the whole array by `dense`."""
+    """LU of a Jacobian known by its products.
+
+    If cheap unknowns can be eliminated, the Schur complement is factorised, otherwise `dense` solves with the whole
+    array.
+    """
 
     dense: LinearSolver = Dense()
 
@@ -150,7 +158,7 @@ class Assembled:
 def _last_known(
     jac: FloatArray, column: FloatArray, corner: float, right: FloatArray
 ) -> tuple[FloatArray | None, float]:
-    """Solve a bordered system whose last row prescribes the last unknown alone, by the inner system without a border."""
+    """Solve a bordered system whose last row prescribes the last unknown, by the inner system without a border."""
     last = right[-1] / corner
     inside, sign = solve_signed(np.array(jac, order="F"), right[:-1] - last * column)
     if inside is None or not np.isfinite(inside).all():
@@ -175,8 +183,8 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
     """Return the solver of systems with `jac` and with its transpose; None if `jac` is singular.
 
-    An array is factorised once, and overwritten. A Jacobian known by its products is factorised
-    if that costs less than several solutions, as several right sides follow; otherwise `linear` solves for each right side.
+    An array is factorised once, and overwritten. A Jacobian known by its products is factorised if that costs less than
+    solutions for several right sides; otherwise `linear` solves for each right side.
     """
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if isinstance(inside, np.ndarray) or array_pays(jac):
@@ -185,7 +193,7 @@ def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
 
 
 def array_pays(jac: Jacobian) -> bool:
-    """Whether a Jacobian known by its products can be factorised, and costs less so for several right sides."""
+    """Whether a Jacobian known by its products can be factorised, and this costs less for several right sides."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return False
@@ -219,7 +227,10 @@ class _Iterated:
 
 
 def assembled(jac: Jacobian) -> FloatArray | None:
-    """Return a Jacobian known by its products as a new array, borders included; None if it cannot be assembled, or is too large."""
+    """Return a Jacobian known by its products as a new array, borders included.
+
+    None if it cannot be assembled, or is too large.
+    """
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not is_assembling(inside) or inside.shape[0] > MAX_ARRAY_UNKNOWNS:
         return None
@@ -234,7 +245,7 @@ def whole_array(jac: Jacobian) -> FloatArray | None:
 
 
 def is_factorised(jac: Jacobian) -> bool:
-    """Whether systems with a Jacobian are solved by LU: it is an array or costs less as one."""
+    """Whether systems with a Jacobian are solved by LU, because it is an array or costs less as one."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if is_assembling(inside):
         return inside.shape[0] <= MAX_ARRAY_UNKNOWNS and not inside.costs.products_pay
@@ -242,7 +253,10 @@ def is_factorised(jac: Jacobian) -> bool:
 
 
 def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
-    """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
+    """Solve a dense system by LU, and return the sign of its determinant (0 if singular), too.
+
+    The `matrix` is overwritten.
+    """
     known = _lu_factors(matrix)
     return (None, 0.0) if known is None else (known(right), known.sign)
 
@@ -286,7 +300,7 @@ def _lu_factors(matrix: FloatArray) -> Factored | None:
         lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
     size = np.abs(lu.diagonal())
     size.sort()
-    # neither NaN, which is sorted to the end, nor infinity passes
+    # NaN, which is sorted to the end, and infinity do not pass
     usable = info == 0 and size[0] > SINGULAR * size[-1]
     return Factored(lu, pivots) if usable else None
 
@@ -295,7 +309,7 @@ class Eliminating(JacobianOperator, Protocol):
     """A Jacobian from which cheap unknowns can be eliminated."""
 
     def eliminated(self) -> Elimination | None:
-        """Return the elimination of cheap unknowns; None if it is no cheaper than the whole array."""
+        """Return the elimination of cheap unknowns; None if the full array is cheaper."""
         ...
 
 
@@ -344,7 +358,10 @@ class BorderedElimination:
         return out
 
     def reduced(self, right: FloatArray, *, transposed: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the right sides of the Schur complement, and their part of the eliminated unknowns; see `Elimination`."""
+        """Return the right sides of the Schur complement, and their part in the eliminated unknowns.
+
+        See `Elimination`.
+        """
         n = len(self.columns)
         rows = self.columns.T if transposed else self.rows
         left, inner = self.inside.reduced(right[:n], transposed=transposed)
@@ -360,7 +377,7 @@ class BorderedElimination:
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """LU factors of the Schur complement of a matrix; None where no unknown remains."""
+    """LU factors of the Schur complement of a matrix; None if no unknown remains."""
 
     elimination: Elimination
     factors: Factored | None
@@ -384,7 +401,7 @@ def _is_eliminating(jac: Jacobian) -> TypeGuard[Eliminating]:
 
 
 def _elimination_of(jac: Jacobian) -> Elimination | None:
-    """Return the elimination of cheap unknowns from a Jacobian, borders included; None where there are none."""
+    """Return the elimination of cheap unknowns from a Jacobian, borders included; None if there are none."""
     inside = jac.flat.jac if isinstance(jac, Bordered) else jac
     if not _is_eliminating(inside):
         return None

@@ -23,7 +23,7 @@ GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {
     "levenberg_marquardt": LevenbergMarquardt,
 }
 
-ROUNDING_REDUCTION = 0.1  # share of the residual left by a step after which it may be rounding
+ROUNDING_REDUCTION = 0.1  # share of the residual after a step above which the residual may be rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,15 +33,16 @@ class Newton:
     Parameters
     ----------
     tolerance
-        Largest absolute entry of the scaled residual at a solution. Where rounding of the unknowns changes the residual by more, as with
-        contacts a million times stiffer than the structure, the level of rounding counts.
+        Largest absolute entry of the scaled residual at a solution. If rounding of the unknowns changes the residual by
+        more, as with contacts a million times stiffer than the structure, the level of rounding applies.
     max_iterations
-        Newton steps before giving up.
+        Largest number of Newton steps.
     globalisation
-        Method where the full Newton step does not reduce the residual: ``line_search`` shortens it, ``dogleg`` bends it towards the gradient
-        (Powell), ``levenberg_marquardt`` damps directions of small singular values.
+        Method for full Newton steps that do not reduce the residual: ``line_search`` shortens the step, ``dogleg``
+        bends it towards the gradient (Powell), ``levenberg_marquardt`` damps directions of small singular values.
     linear
-        Solver of the linear systems; by default LU for a Jacobian that is an array and a Krylov method for one known by its products.
+        Solver of the linear systems; by default LU for a Jacobian that is an array and a Krylov method for one known by
+        its products.
     """
 
     tolerance: float = 1e-10
@@ -86,7 +87,10 @@ def charged(solution: Solution, spent: Sequence[Solution]) -> Solution:
 
 
 def first_converged(attempts: Iterable[Solution]) -> Solution:
-    """Return the first attempt that converged, or the last one, charged with the cost of all. The iterator is not advanced further."""
+    """Return the first attempt that converged, or the last one, charged with the cost of all.
+
+    The iterator is not advanced further.
+    """
     spent: list[Solution] = []
     for attempt in attempts:
         spent.append(attempt)
@@ -113,15 +117,15 @@ def newton(
     options
         Tolerance, limits, globalisation and linear solver.
     globalisation
-        Replaces that of the options, such as `NaturalLevel` for a start near the solution.
+        Replacement for the globalisation of the options, such as `NaturalLevel` for a start near the solution.
     linear
-        Replaces the solver of the options, such as by one that remembers its factors.
+        Replacement for the linear solver of the options, such as one that remembers its factors.
 
     Returns
     -------
     Solution
-        The solution, or the iterate with the smallest residual, with the status that ended the iteration. Its rung is `Rung.DAMPED_STEP` if
-        a step was ever refused.
+        The solution, or the iterate with the smallest residual, with the status that ended the iteration. Its rung is
+        `Rung.DAMPED_STEP` if a step was refused.
     """
     work = Work(evaluate, linear or options.linear)
     globalisation = globalisation or GLOBALISATIONS[options.globalisation]()

@@ -1,4 +1,4 @@
-"""Reasons why a solver stopped, with advice, and its work."""
+"""Reasons why a solver stopped, with advice, and the method that found a solution."""
 
 from enum import IntEnum
 

@@ -1,4 +1,4 @@
-"""One step along a branch: predict, correct, and find the way round corners."""
+"""One step along a branch: prediction, correction, and passage around corners."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,19 +24,19 @@ from stickslip.solve.linear import Signed
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
-SHARP_TURN = 0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
+SHARP_TURN = 0.5  # cosine between successive tangents below which the step is shortened, if possible
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
 STRAIGHT = 0.97  # cosine above which a branch hardly turns
-EASY = 1  # Newton step
-TANGENT_DISTANCE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
-ASIDE = 0.3  # of a step: a parabola that leaves the tangent by more is none of the branch
-PATIENT = 8.0  # smallest steps below which no factors are kept
-LOOKS_AHEAD = (1.0, 4.0, 16.0, 64.0)  # smallest steps at which the far side of a corner is looked for
-# lengths of a step by which its end may be away: farther, it lies on another piece of the branch
+EASY = 1  # Newton steps of an easy correction
+TANGENT_DISTANCE = 0.3  # share of a step: distance from the prediction within which its factors determine the tangent
+ASIDE = 0.3  # share of a step: a parabola farther from the tangent is not used
+PATIENT = 8.0  # times the smallest step, below which no factors are kept
+LOOKS_AHEAD = (1.0, 4.0, 16.0, 64.0)  # smallest steps at which the far side of a corner is probed
+# distance of the end of a step from its start, in step lengths, above which it is on another piece of the branch
 MAX_END_DISTANCE = 2.0
-LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
-ROUND = 300  # Newton steps for the far side of a corner, after which none is looked for
-LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
+LONGEST = 2.0  # longest step at a prescribed change of p, in largest steps: it is longer only next to a fold
+ROUND = 300  # limit of Newton steps for the far side of a corner
+LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # lengths tried along the far side, in smallest steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class _Across:
 
     @cached_property
     def jac(self) -> Bordered:
-        """Derivative by all unknowns; trials that are not accepted never ask for it."""
+        """Derivative by all unknowns; it is not computed for rejected trials."""
         return Bordered(self.at.jac, self.at.jac_p, self.row[:-1], float(self.row[-1]))
 
     @property
@@ -102,7 +102,7 @@ def take_step(problem: Problem, point: Point, unit: FloatArray, step: float, end
     last = LastFactors(own.linear)
     solution = newton(lambda v: across(latest, v, row, value), guess, own, kept, last)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
-    # a corrector that slides far away, or past the end of the range, has found another piece of the branch
+    # a corrector that moves far away, or past the end of the range, has found another piece of the branch
     near = measure.of(solution.x - y) <= MAX_END_DISTANCE * reach and (p - end) * (point.p - end) >= 0.0
     found = replace(solution, x=x)
     if not (solution.status.converged and near):
@@ -119,14 +119,17 @@ def take_step(problem: Problem, point: Point, unit: FloatArray, step: float, end
 
 
 def _keeps(following: Following, step: float) -> bool:
-    """Whether factors are kept in a step: the shortest ones, at corners, are corrected by all that the corrector has."""
+    """Whether factors are kept in a step; the shortest steps, at corners, use the full corrector."""
     return following.corrector == "kept_factors" and step >= PATIENT * following.control.smallest
 
 
 def _by_factors(
     inverse: Signed, before: Point, y: FloatArray, unit: FloatArray, following: Following
 ) -> tuple[FloatArray, float] | None:
-    """Return direction and orientation by the factors of a Jacobian beside `y`; None where the branch turns, and that beside it tells too little."""
+    """Return direction and orientation from the factors of a Jacobian near `y`.
+
+    None if the branch turns, so that these factors are not accurate enough.
+    """
     measure = measure_at(y[:-1], following)
     tangent = inverse(upward(y.size))
     tangent = tangent / measure.of(tangent)
@@ -135,7 +138,7 @@ def _by_factors(
 
 
 def _bend(y: FloatArray, before: FloatArray, tangent: FloatArray, following: Following) -> FloatArray | None:
-    """Return the deviation from its tangent of the parabola through two points with the tangent at the first."""
+    """Return half the curvature of the parabola through two points with the tangent at the first."""
     if following.predictor != "parabola":
         return None
     measure = measure_at(y[:-1], following)
@@ -147,10 +150,10 @@ def _bend(y: FloatArray, before: FloatArray, tangent: FloatArray, following: Fol
 def _prediction(
     point: Point, unit: FloatArray, step: float, measure: Measure, following: Following
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the predicted change of (x, p) and the row of the condition that holds the corrector; None if it is too long."""
+    """Return the predicted change of (x, p) and the row of the corrector's condition; None if it is too long."""
     if following.parametrisation == "natural":
         share = measure.p * abs(float(unit[-1]))
-        # beside a fold a small change of p asks for a long way, whose end has nothing to do with this branch
+        # near a fold a small change of p requires a long step, whose end is not related to this branch
         if step > LONGEST * following.control.largest * share:
             return None
         return step / share * unit, measure.p * upward(unit.size)
@@ -176,9 +179,10 @@ def _direction(
         return chord / measure.of(chord), 0.0
     at = latest.known(y[:-1], float(y[-1]))
     tangent, sign = tangent_at(latest.problem, y, unit, following, at)
-    # Where contact states change the branch may turn back so sharply that the tangent nearest to the old one leads back to the
-    # corner. The sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign
-    # that changes although the tangent hardly turned is a bifurcation point, which is passed straight on.
+    # Where contact states change, the branch may turn back so sharply that the tangent closest to the old one leads
+    # back to the corner. The sign of the bordered determinant is constant along a piecewise smooth path (Allgower &
+    # Georg 1990). If it changes although the tangent hardly turned, the point is a bifurcation, which is passed
+    # straight on.
     old = measure_at(before.x, following)
     if sign * before.orientation < 0.0 and old.cosine(unit, tangent) < SMOOTH_TURN:
         return -tangent, -sign
@@ -188,8 +192,8 @@ def _direction(
 def round_corner(problem: Problem, point: Point, unit: FloatArray, end: float, following: Following) -> Point:
     """Leave a corner of more than a right angle along its far side.
 
-    No plane normal to the old tangent meets the far side. The tangent there follows from the Jacobian just beyond the corner, with the
-    orientation of the path; if the linear solver gives no determinant, both directions are tried.
+    No plane normal to the old tangent meets the far side. Its tangent follows from the Jacobian just beyond the corner,
+    with the orientation of the path; if the linear solver gives no determinant, both directions are tried.
     """
     smallest = following.control.smallest
     measure = measure_at(point.x, following)
@@ -217,7 +221,7 @@ def round_corner(problem: Problem, point: Point, unit: FloatArray, end: float, f
 
 
 def _left(new: Point, side: FloatArray, unit: FloatArray, known: bool, measure: Measure) -> bool:
-    """Whether a step along the far side of a corner ended there, and not on the near side again."""
+    """Whether a step along the far side of a corner ended on the far side, not on the near side."""
     turn = measure.cosine(side, new.tangent)
     return turn > SHARP_TURN and (known or turn > abs(measure.cosine(unit, new.tangent)))
 

@@ -1,4 +1,4 @@
-"""Correctors that trust the linear model near the iterate only: Levenberg-Marquardt's damped least squares, and Powell's dogleg."""
+"""Trust-region correctors: Levenberg-Marquardt's damped least squares, and Powell's dogleg."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ from stickslip.solve.line_search import Kinks, slow
 from stickslip.solve.linear import whole_array
 from stickslip.solve.status import Status
 
-FIRST = 1e-3  # damping of the first step, as a share of the squared columns
-MIN_DAMPING = 1e-14  # smallest damping: below, rounding decides
+FIRST = 1e-3  # damping of the first step, relative to the squared columns
+MIN_DAMPING = 1e-14  # smallest damping: below, rounding dominates
 ACCEPT = 1e-4  # share of the predicted decrease below which a step is refused
-DAMPINGS = 10  # dampings tried at one iterate; each grows faster than the last
+DAMPINGS = 10  # dampings tried at one iterate, with accelerating growth
 STATIONARY_COSINE = 1e-13  # cosine between residual and columns below which the residual has a minimum
-ITERATIVE = 1e-4  # relative accuracy of a step found by products only
-POOR, GOOD = 0.25, 0.75  # shares at which the region shrinks and grows
-REGIONS = 12  # in one region after the other, each a tenth to a half of the last
+ITERATIVE = 1e-4  # relative accuracy of a step computed from products only
+POOR, GOOD = 0.25, 0.75  # shares of the predicted decrease at which the region shrinks and grows
+REGIONS = 12  # regions tried, each a tenth to a half of the previous one
 
 
 class LevenbergMarquardt:
@@ -38,7 +38,7 @@ class LevenbergMarquardt:
         self._growth = 2.0
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         jac, residual = now.at.jac, now.at.residual
         scale = self._scale = column_scale(jac, self._scale)
         size = float(np.linalg.norm(residual))
@@ -64,13 +64,13 @@ class LevenbergMarquardt:
         return beyond
 
     def _trial(self, work: Work, now: Iterate, step: FloatArray) -> Iterate | None:
-        """Return the iterate at the end of a step, and set the damping of the next; None if it is refused."""
+        """Return the iterate after a step, and set the damping of the next; None if the step is refused."""
         residual = now.at.residual
         size = float(np.linalg.norm(residual))
         expected = squared_ratio(residual + times(now.at.jac, step), size) - 1.0
         trial = work.at(now.x + step)
         change = squared_ratio(trial.at.residual, size) - 1.0
-        # no decrease to be expected, to rounding: no decrease to be had
+        # without a predicted decrease beyond rounding, no decrease is possible
         share = change / expected if np.isfinite(change) and expected < 0.0 else -np.inf
         if share <= ACCEPT:
             work.rejected += 1
@@ -87,7 +87,7 @@ def damped_step(jac: Jacobian, right: FloatArray, scale: FloatArray, damping: fl
     Parameters
     ----------
     jac
-        (n, n) Jacobian; it is left as it is.
+        (n, n) Jacobian; it is not changed.
     right
         (n,) right side.
     scale
@@ -115,7 +115,7 @@ def damped_step(jac: Jacobian, right: FloatArray, scale: FloatArray, damping: fl
     stacked = np.zeros((2 * n, n), order="F")
     stacked[:n] = array / scale
     np.fill_diagonal(stacked[n:], root)
-    # QR and not the normal equations, which would square the condition number
+    # QR, because the normal equations would square the condition number
     _, solution, info = scipy.linalg.lapack.dgels(
         stacked, np.append(right, np.zeros(n)), lwork=64 * n, overwrite_a=True
     )
@@ -124,9 +124,10 @@ def damped_step(jac: Jacobian, right: FloatArray, scale: FloatArray, damping: fl
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """From the state down the gradient to the Cauchy point, and on to the Newton point; in scaled steps.
+    """Dogleg path: from the state along the gradient to the Cauchy point, and on to the Newton point, in scaled steps.
 
-    The Newton point is where the model has no residual; it is the Cauchy point itself where the Jacobian is singular.
+    At the Newton point the linear model has no residual. If the Jacobian is singular, the path ends at the Cauchy
+    point.
     """
 
     residual: FloatArray
@@ -152,10 +153,10 @@ class _Path:
 
 
 class Dogleg:
-    """Trust region with the dogleg path (Powell 1970), lengths measured in columns of the Jacobian (Moré 1978).
+    """Trust region with the dogleg path (Powell 1970); lengths are scaled by columns of the Jacobian (Moré 1978).
 
-    At a singular Jacobian the step follows the gradient. The first region contains the whole Newton step, so easy problems cost as much as
-    with Newton's method.
+    At a singular Jacobian the step follows the gradient. The first region contains the whole Newton step, so that easy
+    problems cost as much as with Newton's method.
     """
 
     def __init__(self) -> None:
@@ -164,7 +165,7 @@ class Dogleg:
         self._radius = 0.0
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
-        """Return the next iterate, or why there is none."""
+        """Return the next iterate, or the status that ends the iteration."""
         scale = self._scale = column_scale(now.at.jac, self._scale)
         path = _path(work, now, scale)
         if path is None:
@@ -181,12 +182,12 @@ class Dogleg:
         return beyond
 
     def _within_region(self, work: Work, now: Iterate, path: _Path, scale: FloatArray) -> Iterate | None:
-        """Return the first iterate that decreases the residual as predicted, in smaller and smaller regions."""
+        """Return the first iterate that decreases the residual as predicted, in increasingly small regions."""
         radius, size = self._radius, float(np.linalg.norm(path.residual))
         for _ in range(REGIONS):
             step, model = path.within(radius)
             expected = squared_ratio(model, size) - 1.0
-            if expected >= 0.0:  # to rounding: a smaller region cannot help
+            if expected >= 0.0:  # equal to rounding: a smaller region cannot help
                 return None
             trial = work.at(now.x + step / scale)
             length = float(np.linalg.norm(step))
@@ -205,7 +206,7 @@ class Dogleg:
 
 
 def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
-    """Return the path at an iterate; None where there is no way down."""
+    """Return the path at an iterate; None if there is no descent direction."""
     residual = now.at.residual
     gradient = transposed_times(now.at.jac, residual) / scale
     slope = times(now.at.jac, gradient / scale)  # before the factorisation overwrites the Jacobian
@@ -214,7 +215,7 @@ def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
     if steep <= STATIONARY_COSINE * float(np.linalg.norm(residual)) or not np.any(slope):
         if newton is None:
             return None
-        # nearly singular: the gradient is rounding, the Newton step is not
+        # nearly singular: the gradient is rounding, but the Newton step is not
         return _Path(residual, scale * newton, scale * newton, np.zeros_like(residual), False)
     down = -((steep / float(np.linalg.norm(slope))) ** 2)
     cauchy, left = down * gradient, residual + down * slope
@@ -224,7 +225,7 @@ def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
 
 
 def _shorter(change: float, slope: float) -> float:
-    """Return the factor on a step: to the minimum of the parabola through the known values, within bounds."""
+    """Return the factor on a step that leads to the minimum of the parabola through the known values, within bounds."""
     curved = 2.0 * (change - slope)
     if not np.isfinite(curved):
         return 0.1
