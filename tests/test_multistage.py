@@ -17,7 +17,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.coupled_stages import Flange, constraints, multistage, multistage_modes
+from stickslip.reduction.coupled_stages import Flange, circles, constraints, multistage, multistage_modes
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
@@ -199,3 +199,14 @@ def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
         model.at(0.0)
     with pytest.raises(ss.InputError, match="Give whole numbers from 0 on"):
         ss.Join(between=("a.x", "b.x"), harmonics=(1,))
+
+
+def test_digits_of_a_deck_split_no_circle_wherever_the_flange_lies(stages):
+    sector = stages["first"]
+    dofs, members = sector.structure.dofs, sector.structure.dof_set("flange")
+    noise = 2e-6 * np.random.default_rng(0).uniform(-1.0, 1.0, dofs.position.shape)  # m: six digits
+    for shift in np.linspace(0.0, 2e-4, 101):  # twice what nodes of one circle may differ by
+        moved = replace(dofs, position=dofs.position + noise + np.array([0.0, 0.0, shift]))
+        found = circles(replace(sector, structure=replace(sector.structure, dofs=moved)), members, "first")
+        np.testing.assert_allclose(sorted(found.place[:, 0]), [0.75, 1.0], atol=4e-6)
+        assert found.owner.size == 2 * AROUND // sector.sectors

@@ -427,7 +427,8 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
         raise input_error(where, "has a node of the flange on the axis", "Take it out of the set.")
     height = points @ sector.axis.unit
     step = CIRCLE_RTOL * max(size, float(radius.max()))
-    place, owner = np.unique(np.round(np.column_stack([radius, height]) / step), axis=0, return_inverse=True)
+    both = np.column_stack([_groups(radius, step), _groups(height, step)])
+    place, owner = np.unique(both, axis=0, return_inverse=True)
     owner = owner.reshape(-1)
     radial = arm / radius[:, None]
     frame = np.stack([radial, np.cross(sector.axis.unit, radial), np.tile(sector.axis.unit, (len(points), 1))], axis=1)
@@ -437,6 +438,14 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
     weight = np.concatenate([np.zeros(0), _weights(angle, owner, sector.pitch)])
     mean = np.array([[radius[owner == c].mean(), height[owner == c].mean()] for c in range(len(place))])
     return Circles(sector, mean, owner, own, angle, weight, frame)
+
+
+def _groups(values: FloatArray, gap: float) -> IntArray:
+    """Return the number of the group of each value, ascending; neighbours in a group differ by at most `gap`, wherever they lie."""
+    order = np.argsort(values, kind="stable")
+    groups = np.empty(len(values), dtype=np.int64)
+    groups[order] = np.append(0, np.cumsum(np.diff(values[order]) > gap))
+    return groups
 
 
 def _same_circles(one: Circles, other: Circles, names: tuple[str, str]) -> tuple[Circles, Circles]:
