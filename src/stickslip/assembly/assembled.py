@@ -65,8 +65,8 @@ class Skin:
 class Frequencies:
     """Natural frequencies in Hz of the full and the reduced model, with open and with stuck contacts.
 
-    Open contacts are without free rigid bodies. On a wheel they are those of the wave in which the lowest driven
-    harmonic travels.
+    Open contacts are without free rigid bodies. On a wheel, the frequencies belong to the wave of the lowest driven
+    harmonic.
     """
 
     free_full: FloatArray

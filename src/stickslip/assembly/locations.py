@@ -104,12 +104,13 @@ class Places:
         return self.parts[name]
 
     def spot(self, name: str, place: str) -> Spot:
-        """Return the surface or the dofs behind a name.
+        """Return the surface or the dofs with a name.
 
         Parameters
         ----------
         name
-            ``part`` (a rigid body: its centre), ``part.surface``, ``part.set``, ``part.node12``, ``part.node12.x``, ``part.rx``.
+            ``part`` (a rigid body: its centre), ``part.surface``, ``part.set``, ``part.node12``, ``part.node12.x``,
+            ``part.rx``.
         place
             Study key of the name, for messages.
 

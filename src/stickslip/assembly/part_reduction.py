@@ -273,7 +273,7 @@ def _packed(made: ReducedPart) -> dict[str, Any]:
 
 
 def forget(memo: dict[Any, Any], kind: type, most: int) -> None:
-    """Remove all but the last `most` values of a kind from memory."""
+    """Remove all values of a kind from memory except the last `most`."""
     for key in [key for key, value in memo.items() if isinstance(value, kind)][:-most]:
         del memo[key]
 
@@ -332,7 +332,10 @@ def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
 
 
 def unpacked(values: Mapping[str, Any], full: Structure, kept: IntArray) -> tuple[Structure, Matrix]:
-    """Return a reduced structure and its load of steady rotation from the arrays of `packed`; dofs and sets follow from `full`."""
+    """Return a reduced structure and its load of steady rotation from the arrays of `packed`.
+
+    Dofs and sets follow from `full`.
+    """
     mass, loss = np.asarray(values["mass"]), values.get("loss")
     dofs, sets = (with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size), surviving_sets(full, kept))
     own = mass, values["damping"], values["stiffness"]

@@ -55,7 +55,8 @@ class Events:
 def room_for_events(order: int, elements: int) -> Events:
     """Allocate arrays for the events of gaps with `order` harmonics; `polynomials` is not yet filled.
 
-    A polynomial has at most 2 H sign changes and 2 H extrema, which gives 6 H + 1 cells between nodes, each with two segments.
+    A polynomial has at most 2 H sign changes and 2 H extrema. This gives 6 H + 1 cells between nodes, each with two
+    segments.
     """
     return Events(
         np.zeros((0, 3, 2 * order + 1)),

@@ -45,7 +45,10 @@ class ContactLaw(Protocol):
     def pairs(self) -> int: ...  # noqa: D102
 
     def parameters(self) -> FloatArray:
-        """Return the (n_parameters,) array passed to the step; its length is the same for all laws of a class with as many states."""
+        """Return the (n_parameters,) array passed to the step.
+
+        Its length is the same for all laws of a class with the same number of states.
+        """
         ...
 
     def initial_state(self) -> FloatArray:
@@ -179,7 +182,10 @@ def softened(laws: Iterable[ContactLaw], stiffness: float) -> tuple[ContactLaw, 
 
 
 def held_stiffness(laws: Iterable[ContactLaw], holds: BoolArray, rigid: float) -> FloatArray:
-    """Return the (3 p,) stiffnesses t, w, n in N/m of p contacts: zero where `holds` (p,) is False, `rigid` for rigid laws."""
+    """Return the (3 p,) stiffnesses t, w, n in N/m of p contacts: zero where `holds` (p,) is False.
+
+    Rigid laws have the stiffness `rigid`.
+    """
     own = zip(softened(laws, rigid), holds, strict=True)
     rows = [law.stuck_stiffness() if held else np.zeros(3) for law, held in own]
     return np.array(rows, dtype=float).reshape(-1)

@@ -186,7 +186,7 @@ def _filled(blocks, real, imaginary, below, above):  # type: ignore[no-untyped-d
 
 @njit(cache=True, nogil=True)
 def _laid_out(blocks, real, imaginary, below, lower, above, upper):  # type: ignore[no-untyped-def]
-    """Copy the entries of the pairs `below` and `above`, (k, 2) each, in the order in which `sweep` and `add_upper` read them."""
+    """Copy the entries of the pairs `below` and `above`, (k, 2) each, in the order of `sweep` and `add_upper`."""
     m = blocks.shape[2]
     i = 0
     for h in range(1, (m + 1) // 2):

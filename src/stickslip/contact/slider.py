@@ -104,7 +104,7 @@ def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _merge(first, n_first, low, n_low, high, n_high, starts_open, tau, kinds):  # type: ignore[no-untyped-def]
-    """Sort three ascending lists (changes of the sign of N, extrema of both walls) into nodes from 0 to 2π; return their number."""
+    """Sort sign changes of N and extrema of both walls, all ascending, into nodes from 0 to 2π; return their number."""
     i = j = k = 0
     tau[0] = 0.0
     kinds[0] = _EXTREMUM

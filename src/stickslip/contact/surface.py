@@ -32,11 +32,12 @@ class Surface:
     points
         (n, 3) positions of the nodes in metres.
     displacement
-        (3 n, n_dofs) sparse operator from the structure's coordinates to the displacements x, y, z of the nodes, node by node.
+        (3 n, n_dofs) sparse operator from the structure's coordinates to the displacements x, y, z of the nodes, node
+        by node.
     facets
-        (m, k) nodes (positions in `points`) of triangles and quadrilaterals, linear or quadratic: k = 3, 4, 6 or 8, corners
-        anticlockwise seen from outside the body, then mid nodes. Shorter rows are filled up with -1, so that kinds can be mixed. May be
-        empty for node-to-node contacts with given `normals`.
+        (m, k) nodes (positions in `points`) of triangles and quadrilaterals, linear or quadratic: k = 3, 4, 6 or 8,
+        corners anticlockwise seen from outside the body, then mid nodes. Shorter rows are padded with -1, so that kinds
+        can be mixed. May be empty for node-to-node contacts with given `normals`.
     normals
         (n, 3) outward unit normals at the nodes; None: means of the facets around each node, by angle.
     numbers

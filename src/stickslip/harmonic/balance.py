@@ -39,7 +39,10 @@ JacobianForm = Literal["auto", "dense", "structured"]
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Scaled residual and derivatives at one state, and the time of the contact evaluation; derivatives may be computed at first use."""
+    """Scaled residual and derivatives at one state, and the time of the contact evaluation.
+
+    Derivatives may be computed at first use.
+    """
 
     residual: FloatArray  # (size,)
     by_x: FloatArray | StructuredJacobian | Callable[[], FloatArray]
@@ -118,7 +121,10 @@ class HarmonicBalance:
 
     @cached_property
     def reduced(self) -> bool:
-        """Whether a Jacobian that is solved as an array is given by its parts, so that the solver can eliminate unknowns of stuck contacts."""
+        """Whether a Jacobian that is solved as an array is passed in parts.
+
+        From these the solver can eliminate the unknowns of stuck contacts.
+        """
         return self.jacobian == "auto" and self.order > 0 and self.size >= REDUCED
 
     @cached_property
@@ -127,7 +133,7 @@ class HarmonicBalance:
         return self.jacobian != "dense" and products_pay(self._costs)
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
-        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros for harmonics that are not kept."""
+        """Return the (order+1, n) complex coefficients, m, of scaled unknowns `x`; zeros for missing harmonics."""
         rows = x.reshape(self.n_rows, self.linear.n)
         return complex_rows(rows, self.harmonics) * self.displacement_scale
 
@@ -200,7 +206,7 @@ class HarmonicBalance:
         return rows.reshape(-1) / self.force_scale
 
     def scaled_forces(self, contacts: FloatArray) -> FloatArray:
-        """Return the (size,) part of contact forces in the scaled equations, from their coefficients (m, 3 n_contacts), N."""
+        """Return the (size,) contact forces in the scaled equations, from their coefficients (m, 3 n_contacts), N."""
         return self._with_forces(np.zeros((self.n_rows, self.linear.n)), contacts)
 
     def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
@@ -224,9 +230,10 @@ class HarmonicBalance:
         return self._linear_force(x, omega).reshape(-1) / self.force_scale
 
     def by_mass_damping(self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]) -> FloatArray:
-        """Return the (size,) derivative of the scaled residual by the rate, 1/s, of a damping proportional to the `mass` of each harmonic.
+        """Return the (size,) derivative of the scaled residual by the rate, 1/s, of a mass-proportional damping.
 
-        If products with vectors cannot give it, the motion is expanded to all dofs, and its inertia force is condensed like a load.
+        The `mass` is a function of the harmonic. If products with vectors cannot give the derivative, the motion is
+        expanded to all dofs, and its inertia force is condensed like a load.
         """
         direct = known_by_vectors(self.linear)
         if direct is not None:
@@ -288,7 +295,10 @@ class HarmonicBalance:
         return products(self.linear, self.harmonics, omega).load
 
     def linear_block(self, omega: float, harmonic: int) -> Matrix:
-        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), as a copy; sparse if nothing is condensed."""
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), as a copy.
+
+        It is sparse if nothing is condensed.
+        """
         return products(self.linear, self.harmonics, omega).block(harmonic)
 
     def with_order(self, order: int) -> "HarmonicBalance":
@@ -323,15 +333,17 @@ def harmonic_balance(
     samples
         Samples per period of the contact forces.
     evaluator
-        Evaluator of piecewise-linear laws: ``intervals`` of the samples, exact ``events``, or a ``march``, as for all other laws.
+        Evaluator of piecewise-linear laws: ``intervals`` of the samples, exact ``events``, or a ``march``, as for all
+        other laws.
     jacobian
-        Form of the Jacobian: an array (``dense``), products (``structured``, for a Krylov method), or the cheaper one at this size (``auto``).
+        Form of the Jacobian: an array (``dense``), products (``structured``, for a Krylov method), or the cheaper one
+        at this size (``auto``).
 
     Raises
     ------
     InputError
-        If contacts act on dofs that are not retained, the load excites a harmonic above `order`, there are fewer than four samples a
-        harmonic, or the evaluator or form is unknown.
+        If contacts act on dofs that are not retained, the load excites a harmonic above `order`, there are fewer than
+        four samples per harmonic, or the evaluator or form is unknown.
     """
     harmonics = harmonics_of(order, "order")
     _check_load(linear.load, harmonics)

@@ -54,7 +54,10 @@ Settings = Callable[[FloatArray, float], Setting]  # of the extra unknowns (m,) 
 
 
 def unknown_frequency(family: BalanceAt, scale: float) -> Settings:
-    """Return the settings of a problem whose only extra unknown is ``ln(ω / scale)``, `scale` in rad/s, with the parameter of `family`."""
+    """Return the settings of a problem whose only extra unknown is ``ln(ω / scale)``, `scale` in rad/s.
+
+    Its parameter is the parameter of `family`.
+    """
 
     def setting(extra: FloatArray, p: float) -> Setting:
         near = abs(extra[0]) < WANDERED
@@ -131,7 +134,10 @@ class State:
 
     @cached_property
     def columns(self) -> FloatArray:
-        """(size, m) derivatives of the balance by the extra unknowns: exact for the frequency, central differences for the others."""
+        """(size, m) derivatives of the balance by the extra unknowns.
+
+        They are exact for the frequency, and central differences for the others.
+        """
         own = [
             slope * self.at.jac_p if slope != 0.0 else self._by_level(place)
             for place, slope in enumerate(self.setting.slopes)
@@ -186,7 +192,8 @@ class State:
 class PeriodicProblem:
     """A periodic problem with extra unknowns and as many conditions; an equation in a parameter.
 
-    The unknowns y are those of the balance and the extra unknowns; the residual consists of the balance and the values of the conditions.
+    The unknowns y are the unknowns of the balance, followed by the extra ones; the residual is the residual of the
+    balance, followed by the values of the conditions.
 
     Parameters
     ----------
@@ -195,10 +202,11 @@ class PeriodicProblem:
     conditions
         One for each extra unknown.
     invert
-        Function from a Jacobian to a solver for the systems of the conditions, None if singular; it limits the accuracy of the conditions.
+        Function from a Jacobian to a solver for the systems of the conditions, None if singular; it limits the accuracy
+        of the conditions.
     row
-        (size + 1,) last row of the equations of the tangent of the motion and the first extra unknown. None: this unknown grows by one, which
-        is impossible at a fold.
+        (size + 1,) last row of the equations for the tangent of the motion and the first extra unknown. None: this
+        unknown grows by one, which is impossible at a fold.
     by_parameter
         Function from a state to the derivative of all equations by the parameter; None: a central difference.
     """

@@ -119,7 +119,10 @@ class CondensedProduct:
         return np.asarray(self.linear.nn[2] @ vectors - m @ moved - k @ inner)
 
     def projected(self, vectors: FloatArray) -> "CondensedProduct":
-        """Return the products projected on motions of the retained coordinates, the columns of `vectors` (n, k), without a load."""
+        """Return the products projected on the columns of `vectors` (n, k), without a load.
+
+        The columns are motions of the retained coordinates.
+        """
         own, none = self.linear, np.zeros((len(self.load), vectors.shape[1]))
 
         def near(matrix: FloatArray) -> FloatArray:
@@ -301,7 +304,10 @@ def by_omega(slope: FloatArray, harmonics: Harmonics) -> FloatArray:
 
 
 def dynamic_rows(parts: Lossy, s: FloatArray) -> FloatArray:
-    """Return ``K q + i L q + i s C q - s² M q`` from the products of the matrices with the rows of q; the static row has no L."""
+    """Return ``K q + i L q + i s C q - s² M q`` from the products of the matrices with the rows of q.
+
+    The static row has no L.
+    """
     k, c, m, loss = parts
     moved = s * c
     if loss is not None:

@@ -85,7 +85,7 @@ class DecayingStiffness:
         return self.steady.recover_change(self._at(omega), dq)
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         return self.steady.output_rows(self._at(omega), harmonic, dofs)
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
@@ -93,5 +93,5 @@ class DecayingStiffness:
         return self.steady.strain_energy(self._at(omega), q)
 
     def _at(self, omega: float) -> float:
-        # all that is asked of it is analytic in the frequency
+        # complex, because all functions of the frequency used here are analytic
         return complex(omega, self.rate)  # type: ignore[return-value]

@@ -74,9 +74,9 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
 
 @dataclass(frozen=True, eq=False)
 class DynamicLagrangian:
-    """The periodic problem with rigid contacts; a `HarmonicBalance` contains the linear side and the contacts with stiffness.
+    """The periodic problem with rigid contacts; build it with `dynamic_lagrangian`.
 
-    Scales and solvers are those of `HarmonicBalance`. Build it with `dynamic_lagrangian`.
+    A `HarmonicBalance` contains the linear side and the contacts with stiffness; its scales and solvers are used.
     """
 
     balance: HarmonicBalance

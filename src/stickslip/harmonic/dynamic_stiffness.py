@@ -144,7 +144,7 @@ class CondensedStiffness:
         return _dynamic(self.spectral.far, s, self.loss and self.loss[1])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
-        """Return the (H+1, n_all) coefficients of every dof from those of the retained coordinates (eq. 5 with corrected sign).
+        """Return the (H+1, n_all) coefficients of every dof from the retained coordinates (eq. 5 with corrected sign).
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class CondensedStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], self.interior.size), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         place = np.full(self.retained.size + self.interior.size, -1)
         place[self.retained] = np.arange(self.n)
         rows = np.zeros((dofs.size, self.n), dtype=complex)
@@ -201,7 +201,10 @@ class CondensedStiffness:
         return np.array([states.solve(p, own) for p, own in each])
 
     def _onto(self, s: FloatArray, q: ComplexArray) -> ComplexArray:
-        """Return the (H+1, n_interior) forces of retained coordinates `q` on the interior; matrices of each harmonic are not formed."""
+        """Return the (H+1, n_interior) forces of retained coordinates `q` on the interior.
+
+        The matrices of the harmonics are not formed.
+        """
         k, c, m, loss = onto_interior(self.spectral, np.concatenate([q.real, q.imag]))
         size, twice = len(q), np.concatenate([s, s])
         even, odd = k - twice**2 * m, twice * c
@@ -248,7 +251,10 @@ class CondensedStiffness:
 
 
 def _dynamic(blocks: Blocks, s: FloatArray, loss: FloatArray | None = None) -> tuple[ComplexArray, ComplexArray]:
-    """Return K + is C - s² M, with + i loss where s > 0, and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
+    """Return K + is C - s² M and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1).
+
+    Structural damping adds i loss where s > 0.
+    """
     k, c, m = blocks
     stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
     if loss is not None:
@@ -277,7 +283,8 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     Raises
     ------
     InputError
-        If a matrix is not real, a matrix other than the damping is not symmetric, `retained` has repeated dofs, or the interior is too large or can move freely.
+        If a matrix is not real, a matrix other than the damping is not symmetric, `retained` has repeated dofs, or the
+        interior is too large or can move freely.
     """
     if load.static.size != structure.n:
         raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")

@@ -113,7 +113,7 @@ class TurningStiffness:
         return self.at(omega).recover_change(omega, dq)
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         return self.at(omega).output_rows(omega, harmonic, dofs)
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
@@ -203,7 +203,10 @@ class TurningProducts:
 
 
 def condensed(side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int) -> DynamicStiffness:
-    """Prepare the exact condensation of a linear side at one speed (`condense_side`) or along an engine order (`condense_line`)."""
+    """Prepare the exact condensation of a linear side, at one speed or along an engine order.
+
+    See `condense_side` and `condense_line`.
+    """
     if isinstance(side, SpeedLine):
         return condense_line(side, retained, load, order)
     return condense_side(side, retained, load, order)

@@ -68,7 +68,7 @@ def is_full(harmonics: Harmonics) -> bool:
 
 
 def rows_of(harmonics: Harmonics) -> IntArray:
-    """Return the positions of the real coefficients of a support among those of all harmonics up to its highest."""
+    """Return the positions of the real coefficients of a support within the full set up to its highest harmonic."""
     h = np.array(harmonics[1:], dtype=np.int64)
     return np.concatenate([[0], np.stack([2 * h - 1, 2 * h], axis=1).reshape(-1)])
 
@@ -90,7 +90,7 @@ def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
 
 
 def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:
-    """Return the (highest + 1, ...) complex coefficients of the real `rows` of a support; zeros for harmonics that are not kept."""
+    """Return the (highest + 1, ...) complex coefficients of the real `rows`; zeros for missing harmonics."""
     kept = to_complex(rows)
     if is_full(harmonics):
         return kept

@@ -92,7 +92,7 @@ class LocalBalance:
         return self.balance.coefficients(self.whole(x))
 
     def unknowns(self, coefficients: ComplexArray) -> FloatArray:
-        """Return the scaled unknowns of complex `coefficients`, padded or cut to the harmonics that each coordinate keeps."""
+        """Return the scaled unknowns of complex `coefficients`, padded or cut to the harmonics of each coordinate."""
         return np.asarray(self.balance.unknowns(coefficients)[self.own])
 
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:

@@ -25,7 +25,7 @@ from stickslip.harmonic.matrix_products import products
 from stickslip.harmonic.sparse_stiffness import SparseProduct
 
 JUDGED_MULTIPLE = 3  # highest harmonic of a judging set over the highest that is kept or driven
-HIGHEST = 63  # harmonic, in multiples of the common divisor, up to which resonances are searched: beyond, time integration costs less
+HIGHEST = 63  # multiples of the common divisor up to which resonances are searched: beyond, time integration costs less
 SAMPLES_A_HARMONIC = 8  # of the contact forces, at least: with fewer, aliasing may hide a force
 # error of a solution that is not proved exact, although its prediction is zero; only exact solutions have the error 0
 UNSEEN = float(np.finfo(float).tiny)

@@ -259,7 +259,7 @@ class DynamicStiffness(Protocol):
         ...
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         ...
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:

@@ -68,7 +68,10 @@ def shares_of_two(k: FloatArray, c: FloatArray, m: FloatArray) -> tuple[float, f
 def are_shares(
     a: float, b: float, blocks: tuple[FloatArray, FloatArray, FloatArray], rounding: float = PROPORTIONAL
 ) -> bool:
-    """Whether the damping is ``a`` times the stiffness and ``b`` times the mass, to `rounding` of the largest entry of each row."""
+    """Whether the damping is ``a`` times the stiffness plus ``b`` times the mass.
+
+    In each row, the largest error is compared with `rounding` times the largest entry.
+    """
     k, c, m = blocks
     for first in range(0, len(c), ROWS):
         stiff, damped, inert = (matrix[first : first + ROWS] for matrix in (k, c, m))

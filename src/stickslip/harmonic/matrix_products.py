@@ -49,7 +49,10 @@ def small_blocks(matrices: list[ComplexArray]) -> SmallBlocks:
 
 @lru_cache(maxsize=2)
 def dynamic_stiffness(linear: StiffnessProducts) -> SmallBlocks:
-    """Return the dynamic stiffness of all harmonics at one frequency, N/m; cached for the many products of a Krylov method."""
+    """Return the dynamic stiffness of all harmonics at one frequency, N/m.
+
+    It is cached for the many products of a Krylov method.
+    """
     return small_blocks([linear.block(h) for h in linear.harmonics])
 
 
@@ -130,7 +133,10 @@ def products(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Pr
 
 
 def known_by_vectors(linear: DynamicStiffness) -> CondensedStiffness | None:
-    """Return a condensed structure if its interior is diagonal, without structural damping and Coriolis forces; None otherwise."""
+    """Return a condensed structure if its interior is diagonal; None otherwise.
+
+    Structural damping and Coriolis forces are excluded, too.
+    """
     if isinstance(linear, CondensedStiffness) and linear.diagonal and linear.loss is None:
         return linear if linear.ln is None else None
     return None

@@ -121,7 +121,7 @@ class MistunedStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], self.wheel.n), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         spread = np.zeros((self.wheel.n, self.n), dtype=complex)
         spread[self.retained] = eye = np.eye(self.n, dtype=complex)
         none = np.zeros((self.interior.size, self.n), dtype=complex)

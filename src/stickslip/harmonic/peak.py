@@ -354,7 +354,10 @@ class PeakProblem:
 
 
 def _is_sampled(balance: HarmonicBalance) -> bool:
-    """Whether a law with memory or contact states is evaluated on samples, so that the Jacobian jumps when an event passes one."""
+    """Whether a law with memory or contact states is evaluated on samples.
+
+    The Jacobian then jumps when an event passes a sample.
+    """
     contacts = balance.compiled
     on_grid = contacts.piecewise.size > 0 and contacts.evaluator != "events"
     return on_grid or any(laws.start.shape[1] > 0 for laws in contacts.marched)

@@ -11,7 +11,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 
 NORMAL = 2
-STIFF = 1e5  # stiffness of springs that replace rigid contacts, over the largest stiffness of the structure at a contact: error 1e-5
+STIFF = 1e5  # stiffness of springs that replace rigid contacts, relative to the structure at the contacts: error 1e-5
 
 
 @dataclass(frozen=True, eq=False)

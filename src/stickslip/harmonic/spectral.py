@@ -88,10 +88,10 @@ FAST = 10.0  # poles below this multiple of the lowest interior frequency are sl
 
 @dataclass(frozen=True, eq=False)
 class ModeTerms:
-    """Sum over modes: real, ``Z = Σ_k P_k p^k - left diag(w(p)) right``, ``w = v² / d`` with ``v = p (κ + p)`` and ``d = 1 + p c + p² m``.
+    """Sum over modes, real: ``Z = Σ_k P_k p^k - left diag(w(p)) right``.
 
-    The derivatives are ``dw/dp = v q / d²`` with ``q = 2 κ + (4 + κ c) p + 3 c p² + 2 m p³``, and
-    ``d(v/d)/dp = r / d²`` with ``r = κ + 2 p + (c - κ m) p²``.
+    Here ``w = v² / d`` with ``v = p (κ + p)`` and ``d = 1 + p c + p² m``. The derivatives are ``dw/dp = v q / d²`` with
+    ``q = 2 κ + (4 + κ c) p + 3 c p² + 2 m p³``, and ``d(v/d)/dp = r / d²`` with ``r = κ + 2 p + (c - κ m) p²``.
     """
 
     left: FloatArray  # (n, J)
@@ -104,7 +104,10 @@ class ModeTerms:
     direct: None = None  # the load needs only ``left diag(v / d) source``
 
     def weights(self, powers: ComplexArray, loaded: int) -> tuple[ComplexArray, ComplexArray]:
-        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and v / d and its derivative at the first `loaded` of them."""
+        """Return w and dw/dp, (2, H, J), at the `powers` (H, 4) of p, and load weights at the first `loaded` ones.
+
+        The load weights are v / d and its derivative.
+        """
         d, v, q, r = powers @ self._coefficients
         inverse = 1.0 / d
         over = v * inverse

@@ -180,7 +180,10 @@ class StructuredJacobian:
         return jac
 
     def own_blocks(self) -> Iterator[tuple[ComplexArray, Matrix]]:
-        """Yield for each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and a copy of ``scale (Z_h + K̂ʰʰ)`` (n, n)."""
+        """Yield for each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and ``scale (Z_h + K̂ʰʰ)`` (n, n).
+
+        The matrix is a copy.
+        """
         means = harmonic_means(self.blocks)
         for mean, h in zip(means, self.linear.harmonics, strict=True):
             block = with_contacts(self.linear.block(h), mean, self.rows)
@@ -292,7 +295,7 @@ class StructuredJacobian:
     def _inverses(self, kept: Kept) -> HarmonicFactors | SharedInverses:
         if isinstance(kept, HarmonicFactors):
             return kept
-        assert isinstance(self.linear, Shareable)  # it made what was kept
+        assert isinstance(self.linear, Shareable)  # only such products make a shared factor
         return kept.of(self.linear, harmonic_means(self.blocks), self.scale)
 
     def _sweep(self, own: HarmonicFactors | SharedInverses, right: FloatArray) -> FloatArray:

@@ -217,7 +217,7 @@ class TravellingStiffness:
         return self._spread(omega, dq, np.zeros((dq.shape[0], all_dofs), dtype=complex))
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
-        """Return the (k, n) matrix from a change of the retained coordinates in one harmonic to the change of `dofs` (k,)."""
+        """Return the (k, n) derivatives of `dofs` (k,) by the retained coordinates, in one harmonic."""
         (wave,) = self.at(omega, [harmonic])
         spread = np.zeros((self.n + self.interior.size, self.n), dtype=complex)
         spread[self.retained] = np.eye(self.n)

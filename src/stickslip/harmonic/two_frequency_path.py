@@ -19,7 +19,7 @@ Indices = tuple[tuple[int, int], ...]  # (0, 0) first, then one of each pair (j,
 
 TURNS_A_HARMONIC, LEAST_TURNS = 4, 24
 SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # per turn of the faster phase
-SLIP = 2e-3  # largest error of the second phase, rad per turn: an error ten times as large changes forces by some thousandths
+SLIP = 2e-3  # largest error of the second phase, rad per turn: ten times as much changes forces by some thousandths
 EXACT = 1e-6  # rad per turn: below this error, a ratio counts as a ratio of integers
 LONG = 4  # times the usual number of turns, for a path through a whole slow beat
 
@@ -59,7 +59,9 @@ class TorusPath:
 
 
 def half_plane(order: int) -> Indices:
-    """Return the indices (j, k) of combined frequencies ``j ω1 + k ω2`` with ``|j| + |k|`` up to `order`, one of each pair.
+    """Return the indices (j, k) of combined frequencies ``j ω1 + k ω2`` with ``|j| + |k|`` up to `order`.
+
+    Only one of (j, k) and (-j, -k) is returned.
 
     Raises
     ------
@@ -85,7 +87,7 @@ def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
     order
         Largest sum of harmonics.
     refine
-        Factor on the usual number of turns and of samples a turn.
+        Factor on the usual number of turns, and of samples per turn.
     """
     least = ceil(refine * max(TURNS_A_HARMONIC * order, LEAST_TURNS))
     choices = [(p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1]

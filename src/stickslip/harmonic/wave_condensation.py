@@ -130,7 +130,7 @@ class _SolvedAt:
 
 @dataclass(frozen=True, eq=False)
 class ModalWave:
-    """A Hermitian wave whose interior is written in its modes of unit stiffness, after the static condensation of the interior.
+    """A Hermitian wave with its interior in modes of unit stiffness, after the static condensation of the interior.
 
     With ``p = is`` the interior has ``D_LL = diag(1 + p c + p² m + i l)`` and ``D_NL = p (κ + p) across``.
 

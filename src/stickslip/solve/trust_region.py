@@ -26,8 +26,9 @@ REGIONS = 12  # regions tried, each a tenth to a half of the previous one
 class LevenbergMarquardt:
     """Damped least squares (Levenberg 1944, Marquardt 1963) with the control of damping of Nielsen (1999).
 
-    The step minimises ``|J s + r|² + λ |D s|²``, D being the norms of the columns (Moré 1978), so that units do not matter. λ is proportional
-    to the residual: convergence is then fast even if the Jacobian is singular at the solution (Fan & Yuan 2005).
+    The step minimises ``|J s + r|² + λ |D s|²``, D being the norms of the columns (Moré 1978), so that units do not
+    matter. λ is proportional to the residual: convergence is then fast even if the Jacobian is singular at the solution
+    (Fan & Yuan 2005).
     """
 
     def __init__(self) -> None:

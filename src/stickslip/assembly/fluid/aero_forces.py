@@ -53,7 +53,10 @@ class Flow:
     store: Store = in_memory
 
     def patterns(self, wave_number: int) -> Matrix:
-        """Return the (N, m) force patterns of a wave on the dofs of all parts; waves k and n_s − k have conjugate patterns."""
+        """Return the (N, m) force patterns of a wave on the dofs of all parts.
+
+        Waves k and n_s − k have conjugate patterns.
+        """
         given, sectors = self.given, self.model.sectors
         number = wave_number % sectors
         if given.of_points:

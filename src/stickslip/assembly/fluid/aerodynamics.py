@@ -73,7 +73,10 @@ class Aerodynamics:
             raise input_error("Aerodynamics.modes", f"are {self.modes}", "The lowest is 1.")
 
     def require(self, sectors: int) -> None:
-        """Refuse coefficients that do not fit a wheel: a blade that is a neighbour twice, or a nodal diameter out of range."""
+        """Refuse coefficients that do not fit a wheel.
+
+        A blade must not be a neighbour twice, and the nodal diameter must be in range.
+        """
         twice = one_twice(self.influence.distances, sectors)
         if twice:
             raise input_error(

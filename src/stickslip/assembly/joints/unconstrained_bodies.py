@@ -57,7 +57,10 @@ def refuse_unheld(model: Model) -> None:
 
 
 def unheld(model: Model, holds: BoolArray) -> list[InputError]:
-    """Return an error for each part that can move freely while the contact points `holds` (p,) stick and the others are open."""
+    """Return an error for each part that can move freely while only the contact points `holds` (p,) stick.
+
+    The other contact points are open.
+    """
     bodies = _loose(model)
     columns = _columns(bodies)
     free = _free(model, bodies, holds)

@@ -284,7 +284,10 @@ class ReducedSector:
     bases: Mapping[int, Matrix] = field(default_factory=dict)
 
     def expand(self, q: Matrix, wave_number: int) -> Matrix:
-        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave that has an entry in `bases`."""
+        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave.
+
+        The wave must have an entry in `bases`.
+        """
         k = wave_number % self.sector.sectors
         return np.asarray(self.bases[k] @ (self.ways[k] @ q))
 
@@ -344,7 +347,10 @@ def reduced_wave(
 
 
 def modes_of_wave(sector: CyclicSector, kept: IntArray, k: int, reduction: Reduction) -> Matrix:
-    """Return the modes that a reduction of a wave adds to the static shapes of the kept dofs, on the coordinates of the wave."""
+    """Return the modes that a reduction of a wave adds to the static shapes of the kept dofs.
+
+    They are on the coordinates of the wave.
+    """
     place = np.searchsorted(sector.independent, kept)
     return modes_of(travelling_wave(sector, k), place, reduction)
 

@@ -85,7 +85,7 @@ class FourParameter:
     chi
         Exponent, above -1 and at most 0: energy dissipated in micro-slip grows with the power 3 + chi of the amplitude.
     beta
-        Stiffness of the sliders at φ_max over that of all others, not negative.
+        Stiffness of the sliders at φ_max over the stiffness of all others, not negative.
     n_sliders
         Number of sliders below φ_max, in cells that grow geometrically from φ_max / 1000.
 
@@ -114,7 +114,7 @@ class FourParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstLoading:
-    """Sliders that reproduce a first-loading curve: they slip one after the other at its corners (Segalman & Starr 2008).
+    """Sliders that reproduce a first-loading curve, slipping one by one at its corners (Segalman & Starr 2008).
 
     The curve begins at the origin; at its end all sliders slip, and the force stays constant. Only its shape matters,
     because the element scales it to its own stiffness and limit.

@@ -1,4 +1,7 @@
-"""Tables of the Radau IIA collocation on [0, 1] with `STAGES` nodes, the last of them at 1 (Hairer & Wanner 1996, section IV.5)."""
+"""Tables of the Radau IIA collocation on [0, 1] with `STAGES` nodes (Hairer & Wanner 1996, section IV.5).
+
+The last node is 1.
+"""
 
 from typing import Any
 

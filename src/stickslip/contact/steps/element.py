@@ -10,7 +10,7 @@ from stickslip.contact.law import OPEN, SLIP, STICK
 
 @njit(cache=True)
 def normal_contact(g_n, parameters):  # type: ignore[no-untyped-def]
-    """Return the normal force on the structure, its slope, the limit of the friction force, its slope, and whether it is open."""
+    """Return the normal force on the structure, the friction limit, their slopes, and whether the contact is open."""
     k_n, mu, preload = parameters[K_N], parameters[MU], parameters[PRELOAD]
     if parameters[UNILATERAL] == 0.0:
         return k_n * g_n, k_n, mu * preload, 0.0, False

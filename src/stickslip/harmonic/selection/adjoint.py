@@ -168,7 +168,7 @@ class Estimate:
 
     @property
     def errors(self) -> FloatArray:
-        """(k,) largest expected relative error of each output: the larger one of the last estimate and the Jacobian Alert."""
+        """(k,) largest expected relative error of each output: the larger one of last estimate and Jacobian Alert."""
         return np.maximum(np.abs(self.changes[0]), np.abs(self.changes[-1]))
 
     @property

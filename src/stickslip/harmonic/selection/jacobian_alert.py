@@ -1,4 +1,7 @@
-"""The Jacobian Alert as published (C. Gastaldi and T.M. Berruti, Int. J. Non-Linear Mechanics 92 (2017) 25-40, section 4)."""
+"""The Jacobian Alert as published.
+
+C. Gastaldi and T.M. Berruti, Int. J. Non-Linear Mechanics 92 (2017) 25-40, section 4.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -54,8 +54,8 @@ def jacobian_similarity(
 ) -> JacobianSimilarity:
     """Compare the Jacobians at a solution with few harmonics and at one with many.
 
-    Both are Jacobians of the same, large problem; the contacts are evaluated at different motions, so they differ only in
-    the derivatives K̂ of the contact forces.
+    Both are Jacobians of the same, large problem; the contacts are evaluated at different motions, so they differ only
+    in the derivatives K̂ of the contact forces.
 
     Parameters
     ----------
@@ -70,8 +70,9 @@ def jacobian_similarity(
     tolerance
         Off-diagonal terms of Γ up to this size count as zero.
     scales
-        (n,) size of one unit of each retained coordinate, so that translations and rotations can be summed; None: the displacement at which
-        stuck contacts and structure respond with a unit force (`natural_scales`). The diagonal of Γ does not depend on it.
+        (n,) size of one unit of each retained coordinate, so that translations and rotations can be summed; None: units
+        in which stuck contacts and structure have unit stiffness (`natural_scales`). The diagonal of Γ does not depend
+        on it.
 
     Raises
     ------
@@ -154,9 +155,10 @@ def harmonic_block_norms(
 
 
 def natural_scales(balance: HarmonicBalance) -> FloatArray:
-    """Return the (n,) displacement of each retained coordinate at which structure and stuck contacts respond with a unit force.
+    """Return the (n,) unit of each retained coordinate in which structure and stuck contacts have unit stiffness.
 
-    In such units every coordinate has the same static stiffness, whatever its original unit; a coordinate without stiffness keeps its unit.
+    In such units every coordinate has the same static stiffness, whatever its original unit; a coordinate without
+    stiffness keeps its unit.
     """
     contacts = balance.interface
     stuck = contacts.gap_operator.power(2).T @ contacts.stuck_stiffness()

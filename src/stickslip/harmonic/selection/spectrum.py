@@ -17,7 +17,7 @@ def padded_solution(step: Step) -> FloatArray:
 
 
 def contacts_of_reference(step: Step) -> ContactPeriod:
-    """Return the contacts at a solution, with coefficients and derivatives of all harmonics up to the reference's highest."""
+    """Return the contacts at a solution, with all harmonics up to the highest of the reference."""
     return step.reference.contacts(padded_solution(step), step.omega)
 
 

@@ -49,7 +49,10 @@ class SuessJacobian:
 
 
 def column_norms(step: Step) -> FloatArray:
-    """Return the norm of each harmonic's column without its own block, relative to that block; zeros where the block is zero."""
+    """Return the norm of each harmonic's column without its own block, relative to that block.
+
+    It is zero where the block is zero.
+    """
     own = rows_of(step.reference.harmonics)
     blocks = contacts_of_reference(step).blocks[:, :, own[:, None], own]
     square = np.sum(blocks**2, axis=(0, 1))
