@@ -15,10 +15,10 @@ from stickslip.response.time.start import TransientStart, rest
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
 CONFIDENCE = 0.95
-PERIODIC = -1  # a motion that repeats, for which no solution was found
-APERIODIC = -2  # it does not repeat with the period of the load
-DIVERGED = -3  # it grows without bound
-ALIKE = 0.03  # relative distance of the harmonics in time from those of a solution within which it is that one
+PERIODIC = -1  # the motion repeats, but no solution was found for it
+APERIODIC = -2  # the motion does not repeat with the period of the load
+DIVERGED = -3  # the motion grows without bound
+ALIKE = 0.03  # relative distance between harmonics in time and a solution, up to which they are the same motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Basins:
         Frequency of the load, rad/s.
     ends
         (starts,) number of the motion at this frequency on which each start ends. `APERIODIC`: the motion does not repeat with the
-        period of the load, or not within the allowed periods; `PERIODIC`: it repeats, and no solution was found for it; `DIVERGED`: it
+        period of the load, or not within the allowed periods; `PERIODIC`: it repeats, but no solution was found for it; `DIVERGED`: it
         grows without bound.
     """
 
@@ -61,7 +61,7 @@ def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> t
 
 @dataclass(frozen=True, eq=False)
 class StartSampler:
-    """Random states: the mean of a motion, and displacement and velocity of the lowest modes, each pair uniform in a disc.
+    """Sampler of random states about a mean displacement, with displacement and velocity of each of the lowest modes uniform in a disc.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class StartSampler:
 
 
 def not_marched(system: System) -> str:
-    """Return why a system can neither be integrated in time nor have multipliers here; empty where it can."""
+    """Return the reason why a system has no equations in time, and no multipliers, here; empty if it has."""
     side = system.structure
     if side.wheel is not None or side.speed_follows_frequency:
         return "a tuned wheel is searched as a travelling wave, its sectors are not marched in time"
@@ -111,7 +111,7 @@ def not_marched(system: System) -> str:
 def sampler(
     problem: ForcedProblem, omega: float, motions: list[ComplexArray], modes: int, spread: float
 ) -> StartSampler:
-    """Return a sampler of states about motions, (H+1, n) complex amplitudes in m, up to `spread` times the largest amplitude of each mode."""
+    """Return a sampler of states about the mean of motions (H+1, n), m, up to `spread` times their largest amplitude in each mode."""
     structure = one_structure(problem.system.stuck_structure(), "all motions")
     own = normal_modes(structure, min(modes, structure.n))
     shapes = np.asarray(own.shapes).real
@@ -125,7 +125,7 @@ def sampler(
 
 
 def in_time(own: StartSampler, start: TransientStart, stepping: TimeStepping) -> TransientResult:
-    """Integrate from a state until the motion repeats; results are harmonics of the retained coordinates, then of the outputs."""
+    """Integrate from a state until the motion repeats; report the retained coordinates, then the outputs."""
     system, linear = own.problem.system, own.problem.low.linear
     contacts = system.interface
     watched = np.concatenate([linear.retained, system.outputs])
@@ -143,7 +143,7 @@ def in_time(own: StartSampler, start: TransientStart, stepping: TimeStepping) ->
 
 
 def drawn(own: StartSampler, seed: int, place: int) -> Iterator[TransientStart]:
-    """Yield an endless sequence of states, the same for the same seed and the same number `place` of the frequency."""
+    """Yield an endless sequence of states, determined by the seed and the number `place` of the frequency."""
     number = 0
     while True:
         yield own.draw((seed, place, number))

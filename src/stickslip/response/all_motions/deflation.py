@@ -12,12 +12,12 @@ from stickslip.operators import array_of
 from stickslip.solve.iterate import Evaluation
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 
-SOLUTION_DISTANCE = 1e-4  # distance, relative to the size of the vibrations, within which two solutions are one
+SOLUTION_DISTANCE = 1e-4  # distance, relative to the vibration, up to which two solutions are the same
 
 
 @dataclass(frozen=True, eq=False)
 class _Deflated:
-    """An evaluation whose residual is multiplied by ``Π (1/‖x - x_i‖² + 1)``."""
+    """Evaluation with the residual multiplied by ``Π (1/‖x - x_i‖² + 1)``."""
 
     residual: FloatArray
     jac: FloatArray
@@ -63,10 +63,10 @@ def deflated_newton(
     distance: Distance,
     options: Newton,
 ) -> Solution:
-    """Solve ``residual(x) = 0`` for a solution that is none of the known ones.
+    """Solve ``residual(x) = 0`` for a solution other than the known ones.
 
-    The residual r becomes ``m r``, ``m = Π (1/d_i² + 1)`` with the distance d_i from each known solution: it has no zero there, and far
-    away it is r itself. Its Jacobian is ``m J + r ∇mᵀ``. The solution is solved once more without m.
+    The residual r becomes ``m r`` with ``m = Π (1/d_i² + 1)`` and the distances d_i from the known solutions. It has no zero at a known solution
+    and equals r far away. Its Jacobian is ``m J + r ∇mᵀ``. The solution is then solved once more without m.
 
     Parameters
     ----------

@@ -31,15 +31,15 @@ class Stage:
     end
         Reason for the end of a branch, in words; for starts, whether the budget ended them.
     omega
-        (k,) frequencies of the period of the motion, rad/s, along the branch, of the motions or of the starts.
+        (k,) basic frequencies of the motions along the branch, or of motions or starts, rad/s.
     coefficients
-        (k, H+1, n_retained) amplitudes of the retained coordinates, m; for starts at their end, NaN where no period repeats.
+        (k, H+1, n_retained) amplitudes of the retained coordinates, m; for starts at their end, NaN if the motion does not repeat.
     branch
         (k,) for motions the number of their branch; for starts the number of their motion or a code of `Basins`; otherwise empty.
     multiplier, error
-        (k,) for motions: modulus of the multiplier that decides the stability, and its error; NaN where it was not examined.
+        (k,) for motions: modulus of the deciding multiplier and its error; NaN if not examined.
     change
-        (k,) for motions: predicted change by more harmonics, relative to the vibration; infinite where no motion with more is near.
+        (k,) for motions: predicted change by more harmonics, relative to the vibration; infinite without a nearby motion.
     words
         Stability of the motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
     tries
@@ -65,7 +65,7 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class MotionBranch:
-    """A branch of motions.
+    """Branch of motions.
 
     Attributes
     ----------
@@ -88,12 +88,12 @@ class MotionBranch:
 
     @property
     def isola(self) -> bool:
-        """Whether the branch is a closed curve that no sweep meets."""
+        """Whether the branch is a closed curve off the sweep's branch."""
         return self.origin != "sweep" and self.end == CLOSES
 
     @property
     def peak(self) -> float:
-        """Largest amplitude, m, interpolated between points by a parabola; 0 without points."""
+        """Largest amplitude by parabolic interpolation between points, m; 0 without points."""
         return self._turning(self.amplitude)[0] if self.omega.size else 0.0
 
     @property
@@ -103,13 +103,13 @@ class MotionBranch:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest frequency, rad/s, at folds interpolated by a parabola; NaN without points."""
+        """Lowest and highest frequency, rad/s, with parabolic interpolation at folds; NaN without points."""
         if not self.omega.size:
             return np.nan, np.nan
         return -self._turning(-self.omega)[0], self._turning(self.omega)[0]
 
     def _turning(self, values: FloatArray) -> tuple[float, float]:
-        """Return the largest of the values along the branch, and the frequency there."""
+        """Return the largest value along the branch, and its frequency."""
         around = np.arange(-1, 2) + int(np.argmax(values))
         if self.isola:
             around = around % values.size
@@ -132,7 +132,7 @@ class MotionBranch:
 
 @dataclass(frozen=True, eq=False)
 class MotionAt:
-    """A motion at a frequency that was searched.
+    """Motion at a searched frequency.
 
     Attributes
     ----------
@@ -145,10 +145,9 @@ class MotionAt:
     stability
         ``stable``, ``unstable``, ``undecided`` or ``not examined``.
     multiplier, error
-        Modulus of the multiplier that decides the stability, and its error.
+        Modulus of the deciding multiplier, and its error.
     change
-        Predicted change of the motion by more harmonics, relative to its vibration; infinite where no motion with more is near, NaN
-        where it was not examined.
+        Predicted change of the motion by more harmonics, relative to its vibration; infinite without a nearby motion, NaN if not examined.
     """
 
     branch: int
@@ -216,12 +215,12 @@ class AllMotions:
 
     @property
     def isolas(self) -> tuple[MotionBranch, ...]:
-        """Branches that are closed curves and that no sweep meets."""
+        """Branches that are closed curves off the sweep's branch."""
         return tuple(b for b in self.branches if b.isola)
 
 
 def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) -> AllMotions:
-    """Combine the stages of a search to its result; frequencies are those of the load."""
+    """Combine the stages of a search into its result; frequencies refer to the load."""
     periods = search.periods
     branches = [
         MotionBranch(s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients)
@@ -272,7 +271,7 @@ def work_of(stage: Stage) -> int:
 
 
 def _amplitudes(problem: ForcedProblem, stage: Stage, periods: int) -> FloatArray:
-    """Return the amplitudes of the first output; of motions of several periods over all harmonics."""
+    """Return the amplitudes of the first output; for motions of several periods, over all harmonics."""
     pairs = zip(stage.omega, stage.coefficients, strict=True)
     if periods == 1:
         return np.array([problem.amplitude_of(float(w), q) for w, q in pairs])

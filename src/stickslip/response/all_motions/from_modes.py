@@ -1,4 +1,4 @@
-"""Starts from free motions: a mode at the amplitude at which it has the frequency of one of the harmonics."""
+"""Starts from free motions: a mode at the amplitude where its frequency equals a harmonic's."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,11 +12,11 @@ from stickslip.model.modes import normal_modes
 from stickslip.response.continuation.starting_solutions import GrowingLoad, growing_load
 from stickslip.response.forced.problem import ForcedProblem
 
-PHASES = 8  # of a free motion against the load; a shift by a period of the load gives the same motion
-SPAN = (1e-2, 1e2)  # amplitudes that are looked at, in units of the largest known motion
+PHASES = 8  # of a free motion relative to the load; a shift by a load period gives the same motion
+SPAN = (1e-2, 1e2)  # range of amplitudes, over the known motion
 AMPLITUDES = 40
-HIGHEST = 3  # multiple of the load's frequency that is looked at
-ALIKE = 0.999  # cosine from which two shapes are one
+HIGHEST = 3  # highest multiple of the load's frequency
+ALIKE = 0.999  # cosine above which two shapes are the same
 
 
 def mode_starts(
@@ -27,10 +27,10 @@ def mode_starts(
     known: Sequence[FloatArray],
     modes: int,
 ) -> list[FloatArray]:
-    """Return starts for motions at an internal or subharmonic resonance, the one that needs the smallest load first.
+    """Return starts for motions at an internal or subharmonic resonance, by ascending residual.
 
-    Without damping and load, a mode with contacts stuck or open vibrates freely in one harmonic where the force along its shape
-    vanishes. A motion on an isolated branch lies near such a free motion plus the known motion, at some phase.
+    Without damping and load, a mode with stuck or open contacts vibrates freely in one harmonic at amplitudes where the force along its
+    shape vanishes. A motion on an isolated branch lies near such a free motion plus the known motion, at some phase.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def mode_starts(
     balance
         Equations of the motion.
     omega
-        Frequency of the period of the motion, rad/s.
+        Basic frequency of the motion, rad/s.
     periods
         Periods of the load in one period of the motion.
     known
         Unknowns (size,) of the known motions.
     modes
-        Number of lowest modes with stuck, and with open contacts.
+        Number of lowest modes with stuck and with open contacts, each.
     """
     side = problem.system.structure
     if not known or side.wheel is not None or side.speed_follows_frequency:
@@ -71,13 +71,13 @@ def _size(q: ComplexArray) -> float:
 
 
 def _harmonics(order: int, periods: int) -> list[int]:
-    """Return the harmonics below that of the load, its own, and multiples of it."""
+    """Return the harmonics below the load's, and multiples of the load's harmonic."""
     multiples = (periods * m for m in range(1, HIGHEST + 1))
     return [h for h in (*range(1, periods), *multiples) if h <= order]
 
 
 def _shapes(problem: ForcedProblem, balance: HarmonicBalance, modes: int) -> Iterator[FloatArray]:
-    """Yield the shapes (n_retained,) of the lowest modes, largest entry one, with contacts stuck and open; those that are alike once."""
+    """Yield the distinct shapes (n_retained,) of the lowest modes with stuck and with open contacts, scaled to a largest entry of one."""
     seen: list[FloatArray] = []
     for side in (problem.system.stuck_structure(), problem.system.structure):
         structure = one_structure(side, "all motions")
@@ -94,7 +94,7 @@ def _shapes(problem: ForcedProblem, balance: HarmonicBalance, modes: int) -> Ite
 
 
 def _free_amplitudes(free: GrowingLoad, base: ComplexArray, harmonic: int, shape: FloatArray) -> Iterator[float]:
-    """Yield the amplitudes of a shape, m, at which it vibrates freely in a harmonic about the static part of a motion."""
+    """Yield the amplitudes, m, at which a shape vibrates freely in a harmonic about the static part of a motion."""
     still = np.zeros_like(base)
     still[0] = base[0]
 
@@ -104,7 +104,7 @@ def _free_amplitudes(free: GrowingLoad, base: ComplexArray, harmonic: int, shape
         residual = free.linearise(free.balance.unknowns(q), 0.0).residual
         return float(free.balance.coefficients(residual)[harmonic].real @ shape)
 
-    # without a vibration nothing says how large the others may be
+    # a known motion without vibration gives no scale
     size = float(np.max(np.abs(base[1:]), initial=0.0)) or free.balance.displacement_scale
     tried = size * np.geomspace(*SPAN, AMPLITUDES)
     force = np.array([along(a) / a for a in tried])

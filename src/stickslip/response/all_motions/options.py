@@ -1,4 +1,4 @@
-"""Options of a search for all motions, and its equations."""
+"""Options of a search for all motions, and its forced response."""
 
 from dataclasses import dataclass, field
 
@@ -23,15 +23,15 @@ class MotionSearch:
     omega_range
         Range of the sweep and of the branches, rad/s.
     at
-        Searched frequencies, rad/s; none: the centres of `frequencies` equal parts of the range.
+        Searched frequencies, rad/s; empty: the centres of `frequencies` equal parts of the range.
     frequencies
         Number of searched frequencies without `at`.
     periods
-        Periods of the load in one period of the motion; 3 includes motions of ω/3.
+        Load periods in one period of the motion; 3 includes motions of ω/3.
     harmonics
         Highest harmonic of the load's frequency, the same in the whole search.
     samples
-        Samples per period for contacts that are evaluated on samples.
+        Samples per period for sampled contact laws.
     points
         Smallest number of points of the sweep.
     tries
@@ -39,21 +39,21 @@ class MotionSearch:
     starts
         Random states at each frequency.
     modes
-        Lowest modes, contacts stuck, in which states are drawn; all where there are fewer.
+        Number of lowest modes with stuck contacts in random states.
     spread
-        Largest modal amplitude of a random state over the largest of the known motions.
+        Largest modal amplitude of a random state, over the largest of the known motions.
     most_periods
-        Periods after which a start without a repeating motion is given up.
+        Largest number of periods from a start.
     steps
         Time steps in a period of the motion.
     solves
-        Budget of deflated solves, starts and points of branches together. Deflation leaves half of it to the starts.
+        Budget of deflated solves, starts and branch points together; deflation leaves half of it to the starts.
     seed
         Seed of the random states.
     evaluator
-        How piecewise-linear laws are evaluated.
+        Evaluation of piecewise-linear laws.
     newton
-        Corrector.
+        Corrector options.
     """
 
     omega_range: tuple[float, float]
@@ -92,7 +92,7 @@ class MotionSearch:
 
     @property
     def places(self) -> tuple[float, ...]:
-        """Frequencies that are searched, rad/s."""
+        """Searched frequencies, rad/s."""
         low, high = self.omega_range
         middle = (np.arange(self.frequencies) + 0.5) / self.frequencies
         return self.at or tuple((low + (high - low) * middle).tolist())

@@ -1,4 +1,4 @@
-"""The search: a sweep, deflation at a set of frequencies, random states in time, and each new motion followed as a branch; its estimated time."""
+"""Search for all motions by a sweep, deflation at some frequencies and random states in time, with a branch for each new motion."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -39,18 +39,18 @@ from stickslip.solve.continuation import start_point
 from stickslip.solve.newton_method import Newton, newton
 
 ITERATIONS = 60  # of a deflated solve
-SHARE = 0.5  # of the budget of solves, after which deflation leaves the rest to time
+SHARE = 0.5  # share of the budget for deflation; the rest is left to integration in time
 SCALES = (
     0.25,
     64.0,
-)  # of known motions, as starts: what lies above a resonance that is left may be tens of times as large
+)  # factors on known motions as starts: motions beyond a resonance may be tens of times as large
 OTHER = 0.5  # share of the starts with another harmonic
 GUESSES = (0.5, 2.0, -1.0)
 WHOLE = "it reaches the end of the range"
-LONGEST = 6  # times the points of a sweep that a branch may have
-STEPS_OF_A_SOLVE = 20  # Newton steps of a deflated solve, as a rule
-PERIODS_OF_A_START = 100  # until a motion repeats, as a rule
-TIMED = 3  # periods
+LONGEST = 6  # largest number of points of a branch, over the sweep's
+STEPS_OF_A_SOLVE = 20  # typical number of Newton steps of a deflated solve
+PERIODS_OF_A_START = 100  # typical number of periods until a motion repeats
+TIMED = 3  # periods of the time measurement
 
 
 @by_one_thread
@@ -88,7 +88,7 @@ class _Search:
         self.order = self.search.periods * self.search.harmonics
         self.places = [omega / self.search.periods for omega in self.search.places]
         whole = with_stiffness(self.problem.balance(harmonics_of(self.order)))
-        # a deflated Jacobian has a full row more: it is an array
+        # deflation adds a dense rank-one term to the Jacobian
         self.balance: HarmonicBalance = replace(whole, jacobian="dense")
         self.weights = vibration_weights(self.balance)
         self.now = 0  # work since the last stage
@@ -108,7 +108,7 @@ class _Search:
             if not self._has("motions", place):
                 yield self._kept(self._motions(place, omega))
 
-    # --- what there is ------------------------------------------------------------------------
+    # --- results so far -----------------------------------------------------------------------
 
     def _has(self, kind: str, place: int) -> bool:
         return any(s.kind == kind and s.place == place for s in self.stages)
@@ -133,7 +133,7 @@ class _Search:
         return self._spent()
 
     def _at(self, omega: float, but: int = -1) -> list[tuple[int, FloatArray]]:
-        """Return the solutions at a frequency, each once, with the number of the branch that holds it; `but` those found in time at a place."""
+        """Return the distinct solutions at a frequency with the numbers of their branches, without branches found in time at place `but`."""
         found: list[tuple[int, FloatArray]] = []
         for number, stage in enumerate(self._branches()):
             if but >= 0 and (stage.origin, stage.place) == ("time", but):
@@ -145,7 +145,7 @@ class _Search:
         return found
 
     def _crossings(self, stage: Stage, omega: float) -> Iterator[FloatArray]:
-        """Yield where a branch has a point at a frequency, and where it passes it."""
+        """Yield the unknowns at which a branch meets a frequency, interpolated between points."""
         x = [self.balance.unknowns(q) for q in stage.coefficients]
         off = stage.omega - omega
         for a in np.flatnonzero(off == 0.0):
@@ -157,7 +157,7 @@ class _Search:
         return distance_among(self.weights, known)
 
     def _shifted(self, known: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return solutions as they begin with each period of the load: a subharmonic motion is several, which are one."""
+        """Return the solutions shifted by each load period: a subharmonic motion has several equivalent ones."""
         count, turns = self.search.periods, np.arange(self.order + 1)
         if count == 1:
             return list(known)
@@ -214,10 +214,10 @@ class _Search:
     # --- deflation ----------------------------------------------------------------------------
 
     def _deflated(self, place: int, omega: float) -> Iterator[Stage]:
-        """Search a frequency until as many starts as asked for find nothing new."""
+        """Search a frequency until the requested number of starts finds no new motion."""
         options = replace(self.search.newton, max_iterations=ITERATIONS)
         while True:
-            # begun anew after each find, so that an interrupted search goes on as it would have
+            # new random numbers after each motion, so that an interrupted search continues in the same way
             known = [x for _, x in self._at(omega)]
             rng = np.random.default_rng((self.search.seed, place, len(self._branches())))
             starts = self._guesses(omega, known, rng)
@@ -231,7 +231,7 @@ class _Search:
     def _another(
         self, omega: float, known: Sequence[FloatArray], starts: Iterator[FloatArray], options: Newton
     ) -> tuple[FloatArray | None, int]:
-        """Return a solution that is none of the known ones, None where as many starts as asked for find nothing, and the starts taken."""
+        """Return a new solution, None if the requested number of starts finds none, and the number of starts."""
         apart = self._shifted(known)
         chosen = mode_starts(self.problem, self.balance, omega, self.search.periods, known, self.search.modes)
         most = len(chosen) + self.search.tries
@@ -247,7 +247,7 @@ class _Search:
         return None, most
 
     def _guesses(self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator) -> Iterator[FloatArray]:
-        """Yield starts without end: the stuck vibration, known motions scaled, then scaled and shifted in phase at random."""
+        """Yield an endless sequence of starts: the stuck vibration, scaled known motions, then random scales, phases and harmonics."""
         stuck = bonded_start(self.balance, omega, self.problem.system)
         yield stuck
         still = np.where(self.weights == 0.0, 1.0, 0.0)
@@ -261,7 +261,7 @@ class _Search:
             q = self.balance.coefficients(every[int(rng.integers(len(every)))])
             scale = np.exp(rng.uniform(low, high))
             turned = np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
-            other = rng.uniform() < OTHER  # harmonics that no known motion has are found from none of them
+            other = rng.uniform() < OTHER  # harmonics absent in all known motions have to be added
             moved = q * turned * (1.0 if other else scale)
             moved[0] = q[0]
             if other:
@@ -273,7 +273,7 @@ class _Search:
     # --- time ---------------------------------------------------------------------------------
 
     def _started(self, place: int, omega: float) -> Iterator[Stage]:
-        """Integrate from random states, follow each new motion that they reach, and count the starts of each motion."""
+        """Integrate from random states, follow each new motion, and count the starts that end on each motion."""
         search = self.search
         why = not_marched(self.problem.system)
         solutions = [x for _, x in self._at(omega)]
@@ -288,13 +288,13 @@ class _Search:
             every_harmonic=True,
         )
         linear = self.problem.low.linear
-        # as they were known when the starts began: an interrupted search draws the same states again
+        # motions known when the starts began, so that an interrupted search draws the same states
         motions = [linear.recover(omega, self.balance.coefficients(x)) for _, x in self._at(omega, place)]
         own = sampler(self.problem, omega, motions, search.modes, search.spread)
         ends: list[tuple[int, ComplexArray]] = []
         states = drawn(own, search.seed, place)
         while len(ends) < search.starts and not self._spent():
-            self.now = len(ends) + 1  # those before a branch was found count once
+            self.now = len(ends) + 1  # starts before a new branch are counted with its stage
             found = in_time(own, next(states), stepping)
             rows = found.harmonics[:, : self.balance.linear.n]
             ends.append(({"settled": PERIODIC, "unsettled": APERIODIC, "diverged": DIVERGED}[found.status], rows))
@@ -315,15 +315,15 @@ class _Search:
         return min(float(np.linalg.norm(rows[1:] - known)) for known in every) / size
 
     def _nearest(self, rows: ComplexArray, solutions: Sequence[FloatArray]) -> int:
-        """Return the number of the solution that a motion in time is, `PERIODIC` where it is none."""
+        """Return the number of the solution that equals a motion in time, `PERIODIC` without one."""
         apart = [self._apart(rows, x) for x in solutions]
         best = int(np.argmin(apart)) if apart else 0
         return best if apart and apart[best] <= ALIKE else PERIODIC
 
-    # --- what is there in the end -------------------------------------------------------------
+    # --- final motions ------------------------------------------------------------------------
 
     def _motions(self, place: int, omega: float) -> Stage:
-        """Return the motions at a frequency with their stability, in the order in which starts are counted."""
+        """Return the motions at a frequency with their stability, in the numbering of the starts."""
         found = self._at(omega)
         solved = [newton(lambda v: self.balance.linearise(v, omega), x, self.search.newton) for _, x in found]
         points = [forced_point(self.balance, s, "point", i, omega, 0.0) for i, s in enumerate(solved)]
@@ -354,7 +354,7 @@ class _Search:
 
 
 def search_seconds(problem: ForcedProblem, search: MotionSearch) -> float:
-    """Return the estimated time of deflated solves and starts, s, without new branches. The budget may end the search earlier."""
+    """Estimate the time of deflated solves and starts, s, without new branches; the budget may end the search earlier."""
     order, omega = search.periods * search.harmonics, search.places[0] / search.periods
     whole = with_stiffness(problem.balance(harmonics_of(order)))
     balance = replace(whole, jacobian="dense")

@@ -1,4 +1,4 @@
-"""Bifurcations of a forced response: where they are on a branch, and the branches that leave there."""
+"""Bifurcations of a forced response: location on a branch, and branches that emanate there."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Steps of a branch in which bifurcations are located, and multipliers sorted so that they are continuous along a branch."""
+"""Segments of a branch that bracket bifurcations, and multipliers sorted to be continuous along a branch."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.branch_events import FOLD, Mark, located
 from stickslip.solve.continuation import start_point
 
-SAME_SHEET = 0.3  # relative change of a motion by more harmonics beyond which it is another one
-APART = 100.0  # tolerances that the last two neighbours may be apart where the branch has no gap
+SAME_SHEET = 0.3  # relative change of a motion by more harmonics above which it is another motion
+APART = 100.0  # largest distance of the last two neighbours on a branch without a gap, in tolerances
 Examine = Callable[[ForcedProblem, ForcedPoint], Stability]
-ON_AXIS = 1e-6  # imaginary part below which a multiplier is real: pairs of real matrices have none at all
+ON_AXIS = 1e-6  # imaginary part below which a multiplier is real: real multipliers of real matrices have exactly zero
 CIRCLE = 1.0 + UNIT_TOLERANCE
 
 
@@ -29,7 +29,7 @@ class Stretch:
     problem
         The forced response.
     balance, following
-        Equations with these harmonics, and options of their continuation.
+        Equations with these harmonics, and their continuation options.
     before, after
         The two points, with tangents along the branch.
     """
@@ -64,7 +64,7 @@ class Stretch:
         return located(self.balance, self.before, self.after, FOLD, self.following)
 
     def where(self, value: Callable[[Point], float], tolerance: float) -> Point:
-        """Return the point at which a function of the point changes sign or jumps over zero."""
+        """Return the point at which a function of the point changes its sign, continuously or by a jump."""
         mark = Mark(name="bifurcation", value=value, tolerance=tolerance)
         return located(self.balance, self.before, self.after, mark, self.following)
 
@@ -99,7 +99,7 @@ def stretch(problem: ForcedProblem, before: ForcedPoint, after: ForcedPoint) -> 
 
 
 def _solved(balance: Balance, following: Following, point: ForcedPoint) -> Point | None:
-    """Return a point with the harmonics of a balance, its tangent showing growing frequency; None where it has none beside it."""
+    """Return a point solved with the harmonics of a balance, with its tangent towards growing frequency; None without a nearby solution."""
     x = balance.unknowns(point.coefficients)
     found = start_point(balance, x, point.omega, following)
     if not found.solution.status.converged:
@@ -123,7 +123,7 @@ class Spectrum:
 
     @property
     def outside(self) -> int:
-        """Number of multipliers outside of the unit circle."""
+        """Number of multipliers outside the unit circle."""
         return int(np.count_nonzero(np.abs(self.values) > CIRCLE))
 
     def excess(self, k: int) -> float:
@@ -161,7 +161,7 @@ def spectrum(found: Stability, neutral: int) -> Spectrum:
 
 
 def nearest_to_one(found: Stability) -> tuple[complex, float]:
-    """Return the multiplier that is nearest to 1 and its error: that of a fold."""
+    """Return the multiplier nearest to 1, which belongs to a fold, and its error."""
     values = found.floquet.multipliers
     if found.unknown or not values.size:
         return complex(np.nan), np.inf

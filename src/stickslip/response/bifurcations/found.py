@@ -1,4 +1,4 @@
-"""Bifurcations found on a branch, their cost, and ranges that were not searched."""
+"""Results of a search for bifurcations: bifurcations, cost, and ranges that were not examined."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -26,25 +26,25 @@ class Bifurcation:
     Parameters
     ----------
     kind
-        ``fold``, ``period doubling`` (crossing at -1), ``Neimark-Sacker`` (crossing at an angle), ``branch point`` (crossing at 1
-        without a fold: a branch of less symmetry crosses), or ``jump of multipliers`` (over the circle, by a contact that changes its state).
+        ``fold``, ``period doubling`` (crossing at -1), ``Neimark-Sacker`` (crossing at an angle), ``branch point`` (crossing at 1 without a
+        fold: a branch of less symmetry crosses), or ``jump of multipliers`` (across the circle, by a change of a contact state).
     point
         Solution at the bifurcation, with the harmonics of the branch.
     amplitude
         Amplitude of the response, m.
     multiplier
-        Crossing multiplier; at a fold the one nearest to 1, at a jump the larger of the two sides. NaN where unknown.
+        Crossing multiplier; at a fold the one nearest to 1, at a jump the larger one of both sides. NaN if unknown.
     multiplier_error
         Error bound of the multiplier against the motion with all harmonics.
     omega_error
-        Error bound of the frequency, rad/s, from the bracket and from the error of the multiplier. At a fold it is the difference
-        from the same fold with more harmonics.
+        Error bound of the frequency, rad/s, from the bracket and from the error of the multiplier; at a fold, the difference to the same
+        fold with more harmonics.
     before, after
         Number of multipliers outside the unit circle on either side.
     place
         Positions of the two neighbouring points.
     certain
-        Whether the crossing multiplier, with its error, lies on its side of the circle at both of these points. A fold is certain.
+        Whether the crossing multiplier, with its error, lies on one side of the circle at both points. A fold is certain.
     """
 
     kind: BifurcationKind
@@ -60,7 +60,7 @@ class Bifurcation:
 
     @property
     def omega(self) -> float:
-        """Its frequency, rad/s."""
+        """Frequency of the bifurcation, rad/s."""
         return self.point.omega
 
     @property
@@ -96,7 +96,7 @@ class Bifurcation:
 
 @dataclass(frozen=True, eq=False)
 class Bifurcations:
-    """The bifurcations of a branch.
+    """Bifurcations of a branch.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Bifurcations:
     stabilities
         Stability of each point of the branch; None where it was not computed or is unknown.
     stride
-        Every so many points one was examined, and those between where the number of multipliers outside the circle differs.
+        Distance of examined points. Points between two of them are examined where the numbers of multipliers outside the circle differ.
     """
 
     found: tuple[Bifurcation, ...]
@@ -125,7 +125,7 @@ class Bifurcations:
 
     @property
     def none_met(self) -> tuple[str, ...]:
-        """Sentence that no bifurcation was found, and how many motions have undecided multipliers; empty where some were found."""
+        """Sentence that no bifurcation was found, with the number of undecided motions; empty if some were found."""
         known = [s for s in self.stabilities if s is not None]
         open_ = sum(s.verdict == "undecided" for s in known)
         unjudged = f"{open_} of {len(known)} motions could not be judged" if open_ else ""

@@ -24,22 +24,22 @@ from stickslip.response.stability.found import Stability
 from stickslip.response.stability.settled import stability
 from stickslip.solve.branch import Point
 
-TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located
-MAX_EXAMINED_MOTIONS = 300  # motions whose multipliers are asked for
-LOOKING = 2 / 3  # share of these that the points of the branch may take; locating what they show has the others
-JUMP = 5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
+TOLERANCE = 1e-6  # tolerance of the location, as a length along the branch
+MAX_EXAMINED_MOTIONS = 300  # largest number of motions with computed multipliers
+LOOKING = 2 / 3  # share of these for points of the branch; the others serve the location of bifurcations
+JUMP = 5e-3  # change of a modulus within the last bracket that counts as a jump; a smooth change is a hundred times smaller
 BESIDE = (
     0.5,
     0.2,
     0.08,
     0.03,
     0.01,
-)  # of a step, from its fold: where it is looked at if another multiplier crosses, too
+)  # distances from a fold, over the parts of its step, at which multipliers are computed if another one crosses, too
 NO_CORNER = "no solution with the harmonics of both ends is found at one of them"
 GAP = "the branch has a gap there, and goes on elsewhere"
 NO_MOTION = "no motion was found there"
 UNKNOWN = "no multipliers are known at one of its ends"
-ROUGH = 0.1  # error of a multiplier beyond which a crossing that it may not make at all tells nothing
+ROUGH = 0.1  # largest error of a multiplier whose crossing is reported if it is uncertain
 ROUGHLY = "multipliers seem to cross the unit circle, and more harmonics change them by more than 0.1: solve with more of these"
 SPENT = "the multipliers of as many motions were asked for as was allowed"
 
@@ -71,12 +71,12 @@ def bifurcations(
         Tolerance of the location, a length along the branch, see `StepControl`.
     most
         Largest number of motions whose multipliers are computed. If the branch has more than two thirds as many points, only every
-        second, third, ... is examined, and those between where the numbers of multipliers outside the circle differ.
+        second, third, ... point is examined, and points between where the numbers of multipliers outside the circle differ.
 
     Raises
     ------
     InputError
-        If the tolerance is not positive, or fewer than 20 motions are allowed; also from `examine`.
+        If the tolerance is not positive, or fewer than 20 motions are allowed; also raised by `examine`.
     """
     if not 0.0 < tolerance < 1.0:
         raise input_error("bifurcations: tolerance", f"must be between 0 and 1, got {tolerance:g}", "1e-6 is usual.")
@@ -101,7 +101,7 @@ def bifurcations(
 
 
 def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
-    """Yield the positions of points that converged one after the other."""
+    """Yield the ranges of consecutive converged points."""
     begin = 0
     for place, point in enumerate(branch):
         if not point.converged:
@@ -117,7 +117,7 @@ _Seen = tuple[Point, Spectrum]
 
 @dataclass(frozen=True, eq=False)
 class _Crossing:
-    """A bifurcation, and where along its step it lies."""
+    """Bifurcation and its position within its step."""
 
     share: float
     found: Bifurcation
@@ -204,7 +204,7 @@ class _Walk:
         found = None
         try:
             found = self._look(point)
-        except StickslipError:  # said by the search for the others
+        except StickslipError:  # reported by the search for other bifurcations
             self.examine = None if self.examined <= 1 else self.examine
         value, error = (complex(np.nan), np.inf) if found is None else nearest_to_one(found)
         made = Bifurcation(
@@ -221,7 +221,7 @@ class _Walk:
         self.crossings.append(_Crossing(step.along(at), made))
 
     def _fold_error(self, step: Stretch, at: Point) -> float:
-        """Return the distance of a fold from the same one with more harmonics, rad/s; infinite where that is not found."""
+        """Return the distance of a fold from the same fold with more harmonics, rad/s; infinite if it is not found."""
         order = 2 * step.balance.order + 3
         more = self.problem.balance(tuple(range(order + 1)))
         ends = [step.forced(p) for p in (step.before, step.after)]
@@ -233,7 +233,7 @@ class _Walk:
         return abs(found.p - at.p) if found.solution.status.converged else np.inf
 
     def _compare(self, branch: Sequence[ForcedPoint], steps: dict[int, Stretch | None], a: int, b: int) -> None:
-        """Look for the steps between two points in which numbers differ."""
+        """Find the steps between two points in which the number of multipliers outside the circle changes."""
         first, last = self._look(branch[a]), self._look(branch[b])
         if first is None or last is None:
             spent = self.examined >= self.most
@@ -254,7 +254,7 @@ class _Walk:
             self._locate(step, a, beside_fold=another)
 
     def _locate(self, step: Stretch, place: int, *, beside_fold: bool) -> None:
-        """Locate all crossings within a step: one after the other in the remaining parts on both sides, or on both sides of a fold."""
+        """Locate all crossings within a step, one by one in the remaining parts on both sides; a fold divides the step first."""
         at = [step.before, step.after]
         if beside_fold:
             at[1:1] = self._around(step)
@@ -269,7 +269,7 @@ class _Walk:
             self._within(step, step.between(low, high), place, spectra[i], spectra[i + 1], neutral)
 
     def _around(self, step: Stretch) -> list[Point]:
-        """Return two points about a fold between which as many multipliers cross as at a fold, an odd number; none where there are none."""
+        """Return two points about a fold between which an odd number of multipliers crosses, as at a fold; empty without such points."""
         fold = step.fold()
         if not fold.solution.status.converged:
             return []
@@ -308,7 +308,7 @@ class _Walk:
     def _root(
         self, step: Stretch, k: int, first: Spectrum, last: Spectrum, neutral: int
     ) -> tuple[Point, _Seen, _Seen] | str:
-        """Return where the modulus of a place passes the circle, and its neighbours on both sides; or why nothing is seen."""
+        """Return the point at which the k-th modulus passes the circle, and its neighbours on both sides; or the reason for a failure."""
         if first.rough(k, ROUGH) and last.rough(k, ROUGH):
             return ROUGHLY
         known: list[_Seen] = [(step.before, first), (step.after, last)]
@@ -338,7 +338,7 @@ class _Walk:
     def _described(
         self, step: Stretch, place: int, k: int, ends: tuple[Spectrum, Spectrum], sides: tuple[_Seen, _Seen], at: Point
     ) -> Bifurcation:
-        """Return the crossing between two neighbours of a located point."""
+        """Return the bifurcation between two neighbours of a located point."""
         (low, before), (high, after) = sides
         larger, smaller = (before, after) if before.excess(k) > after.excess(k) else (after, before)
         value, error = larger.of_place(k)
@@ -370,7 +370,7 @@ class _Walk:
 
 
 def _at_one_beside(fold: Bifurcation, other: Bifurcation) -> bool:
-    """Whether what crosses near a fold may be the multiplier of the fold."""
+    """Whether a crossing near a fold may be the multiplier of the fold."""
     real = other.kind in ("branch point", "jump of multipliers") and other.multiplicity == 1
     return (
         other.kind != "fold"
@@ -381,10 +381,10 @@ def _at_one_beside(fold: Bifurcation, other: Bifurcation) -> bool:
 
 
 def _not_told_apart(fold: Bifurcation, other: Bifurcation) -> bool:
-    """Whether a crossing is at 1 and at a fold, by its errors: there two multipliers that more harmonics bring together look like a pair."""
+    """Whether a crossing, within its errors, lies at 1 and at a fold: two multipliers that meet there may look like a complex pair."""
     at_one = abs(other.multiplier - 1.0) <= other.multiplier_error
     return at_one and abs(other.omega - fold.omega) <= other.omega_error + fold.omega_error
 
 
 class _NoMultipliersError(Exception):
-    """A motion on the way has no multipliers, or no more may be asked for."""
+    """An intermediate motion has no multipliers, or the budget is spent."""

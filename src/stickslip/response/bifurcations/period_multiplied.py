@@ -1,4 +1,4 @@
-"""The forced response with a longer period or less symmetry: several periods of the load, or every sector of a wheel for itself."""
+"""Forced response with a longer period or less symmetry: over several load periods, or with independent sectors of a wheel."""
 
 from dataclasses import dataclass, replace
 
@@ -17,8 +17,8 @@ from stickslip.response.time.sectors import SectorsInTime, all_sectors
 def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProblem:
     """Return the forced response whose period is `periods` periods of the load.
 
-    Its frequency is ω / `periods`. Harmonic h of the load is its harmonic `periods` · h, and the harmonics between are
-    subharmonic. Its sweep, points and amplitudes refer to the lower frequency.
+    Its frequency is ω / `periods`. Harmonic h of the load is its harmonic `periods` · h; the harmonics between are subharmonic. Sweep, points
+    and amplitudes refer to the lower frequency.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProb
     Raises
     ------
     InputError
-        If there are fewer than two periods, or what vibrates is not one structure.
+        If there are fewer than two periods, or the harmonics have different structures.
     """
     if periods < 2:
         raise input_error("over_periods: periods", f"must be at least 2, got {periods}", "2 doubles the period.")
@@ -82,9 +82,9 @@ class EverySector:
     Parameters
     ----------
     problem
-        The forced response of all sectors as one structure; outputs are those of sector 0, then those of sector 1, and so on.
+        Forced response of all sectors as one structure, with the outputs of sector 0, of sector 1, and so on.
     tuned
-        Forced response of one sector, which stands for all.
+        Forced response of one sector, which represents all.
     sectors
         All sectors for time integration.
     """
@@ -95,7 +95,7 @@ class EverySector:
 
     @property
     def sector_of(self) -> IntArray:
-        """(n_retained,) the sector of each retained coordinate."""
+        """(n_retained,) sector of each retained coordinate."""
         own = self.sectors.structure.n // self.sectors.count
         return np.asarray(self.problem.system.retained // own)
 
@@ -117,7 +117,7 @@ def every_sector(problem: ForcedProblem) -> EverySector:
     Raises
     ------
     InputError
-        If what vibrates is no tuned wheel with every wave; and what `stickslip.response.all_sectors` refuses.
+        If the structure is no tuned wheel with every wave; also raised by `stickslip.response.all_sectors`.
     """
     wheel = problem.system.structure.wheel
     if wheel is None or not wheel.has_every_wave:

@@ -1,4 +1,4 @@
-"""Branches that leave the forced response: of a doubled period, of less symmetry, or subharmonic ones that nothing leads to.
+"""Branches beside the forced response: with doubled period, with less symmetry, or isolated subharmonic ones.
 
 Branch switching finds the directions of the crossing branches and the first point of each.
 """
@@ -21,12 +21,12 @@ from stickslip.solve.continuation import advance, start_point, step_to
 from stickslip.solve.steps import take_step
 from stickslip.units import HZ, millimetres
 
-POINTS = 80  # of a branch, at most
-ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
-CLOSED = 0.5  # steps by which the line between two points may miss the first one where a branch closes
-MIN_POINTS_BEFORE_CLOSING = 6  # points before which it does not
-TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
-SHORT = 0.02  # that share
+POINTS = 80  # largest number of points of a branch
+ALIKE = 1e-3  # relative difference from the original branch below which a motion belongs to it
+CLOSED = 0.5  # largest distance of the first point from the line between two points of a closing branch, in steps
+MIN_POINTS_BEFORE_CLOSING = 6
+TURNS = 24  # points within a small share of the longest step that show a branch stuck at a corner
+SHORT = 0.02  # this share
 CLOSES = "it closes in itself"
 LEAVES = "it leaves the range of frequencies"
 AWAY = (
@@ -38,9 +38,9 @@ AWAY = (
     0.01,
     0.003,
     0.001,
-)  # of the size of the motion: how far along the new branch its first point is looked for
-ROUNDS = 6  # of inverse iteration: singular values are far apart where one is nearly zero
-BESIDE = 1e-12  # of the largest entry: what keeps a singular matrix from being divided by
+)  # distances along the new branch at which its first point is sought, relative to the motion
+ROUNDS = 6  # of inverse iteration: the smallest singular value is well separated
+BESIDE = 1e-12  # shift over the largest entry, against division by zero in a singular matrix
 
 
 def _never() -> str:
@@ -59,7 +59,7 @@ class SideBranch:
     periods
         Periods of the load in one period of the motion.
     points
-        Points along the branch, from where it was found. Their frequency is that of the load over `periods`.
+        Points along the branch, from the first one found. Their frequency is the load frequency over `periods`.
     end
         Reason for the end of the branch, in words.
     sector_of
@@ -79,7 +79,7 @@ class SideBranch:
 
     @property
     def amplitudes(self) -> FloatArray:
-        """(points,) amplitudes over the harmonics that the load drives, m."""
+        """(points,) amplitudes over the driven harmonics, m."""
         return np.array([self.problem.amplitude(p) for p in self.points])
 
     def amplitude(self, point: ForcedPoint, output: int) -> float:
@@ -126,13 +126,13 @@ def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: i
     """Follow the branches that leave a forced response at a bifurcation.
 
     At a period doubling the motion covers two periods of the load. At a branch point of a tuned wheel every sector may move
-    differently. Branches leave along the singular directions of the equations. They are followed by arc length, with fixed harmonics,
-    until they return, leave the range of frequencies, or reach the largest number of points.
+    differently. Branches leave along the null directions of the Jacobian. They are followed by arc length, with fixed harmonics, until they
+    return, leave the frequency range, or reach the largest number of points.
 
     Parameters
     ----------
     problem
-        The forced response that has the bifurcation.
+        The forced response with the bifurcation.
     bifurcation
         A period doubling, a branch point, or a jump of a real multiplier.
     points
@@ -231,9 +231,9 @@ def both_ways(
     points: int,
     over: Callable[[], str] = _never,
 ) -> tuple[list[ForcedPoint], str]:
-    """Follow a branch from one of its points to both sides; return at most `points` points in their order, and the reason for the end.
+    """Follow a branch from one of its points in both directions; return at most `points` points in their order, and the reason for the end.
 
-    `over` is called before each step; a text from it ends the branch and is the reason.
+    `over` is called before each step; a non-empty result ends the branch and is the reason.
     """
     way = _Way(problem, balance, following, points, over)
     upward, end = way.followed(first, way.closes(first))
@@ -251,7 +251,7 @@ Stop = Callable[[Point, Point], str]
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """How branches of a problem are followed."""
+    """Continuation of the branches of a problem."""
 
     problem: ForcedProblem
     balance: Balance
@@ -261,7 +261,7 @@ class _Way:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The range of frequencies, rad/s."""
+        """Frequency range, rad/s."""
         return self.problem.sweep.omega_range
 
     def point(self, point: Point) -> ForcedPoint:
@@ -269,7 +269,7 @@ class _Way:
         return _point(self.balance, point)
 
     def followed(self, first: Point, stops: Stop | None) -> tuple[list[Point], str]:
-        """Return the points from a first one along its tangent, and the reason for the end."""
+        """Follow a branch from a first point along its tangent; return its points and the reason for the end."""
         low, high = self.ends
         found = [first]
         while len(found) < self.points:
@@ -291,7 +291,7 @@ class _Way:
         return found, "it goes on beyond as many points as were allowed"
 
     def _stuck(self, found: list[Point]) -> bool:
-        """Whether the last points lie within a step of usual length."""
+        """Whether the last points lie within a small share of the longest step."""
         if len(found) <= 2 * TURNS:
             return False
         last = found[-TURNS:]
@@ -301,7 +301,7 @@ class _Way:
 
     @property
     def _load(self) -> float:
-        """Periods of the load in one of the motion."""
+        """Load periods in one period of the motion."""
         return float(min(h for h, f in self.problem.low.linear.load.harmonics.items() if np.any(f)))
 
     def closes(self, first: Point) -> Stop:
@@ -324,7 +324,7 @@ class _Way:
 
 @dataclass(eq=False)
 class _Apart:
-    """How far a branch is from the one that it left, which goes along beside it; zero is passed where it comes back."""
+    """Difference of a branch from the original branch at the same frequency; it passes zero where the branch returns."""
 
     balance: Balance
     following: Following
@@ -353,7 +353,7 @@ class _Apart:
 
 
 def _periods(bifurcation: Bifurcation) -> int:
-    """Return the periods of the load in one of a motion that leaves."""
+    """Return the load periods in one period of the emanating motion."""
     value = bifurcation.multiplier
     smooth = bifurcation.kind in ("period doubling", "branch point")
     if not smooth and (bifurcation.kind != "jump of multipliers" or abs(value.imag) > 0.0):
@@ -366,7 +366,7 @@ def _periods(bifurcation: Bifurcation) -> int:
 
 
 def _same(balance: Balance, first: Point, others: list[Point], group: IntArray | None) -> bool:
-    """Whether a branch begins as another one does with its sectors renumbered."""
+    """Whether the beginning of a branch equals another one's with renumbered sectors."""
     own = _sizes(balance, first, group)
     return any(
         np.allclose(own, _sizes(balance, other, group), rtol=1e-6) and np.isclose(first.p, other.p, rtol=1e-9)
@@ -375,7 +375,7 @@ def _same(balance: Balance, first: Point, others: list[Point], group: IntArray |
 
 
 def _sizes(balance: Balance, point: Point, group: IntArray | None) -> FloatArray:
-    """Return the size of the vibration of each sector, or coordinate, in growing order."""
+    """Return the size of the vibration of each sector, or coordinate, in ascending order."""
     size = np.sum(np.abs(balance.coefficients(point.x)[1:]) ** 2, axis=0)
     return np.sort(np.bincount(np.arange(size.size) if group is None else group, size))
 
@@ -385,10 +385,10 @@ def _point(balance: Balance, point: Point) -> ForcedPoint:
 
 
 def open_directions(balance: HarmonicBalance, point: Point, following: Following, count: int) -> FloatArray:
-    """Return the (count, n + 1) directions of crossing branches, along which the equations change least.
+    """Return the (count, n + 1) directions of crossing branches: approximate null vectors of the Jacobian.
 
-    They are the singular vectors of the smallest singular values of the Jacobian with the tangent of the branch as a further row, by
-    inverse iteration.
+    They are the singular vectors of the smallest singular values of the Jacobian with the branch's tangent as an additional row, by inverse
+    iteration.
     """
     at = balance.linearise(point.x, point.p)
     jac = at.dense_jac()
@@ -409,11 +409,11 @@ def open_directions(balance: HarmonicBalance, point: Point, following: Following
 
 
 def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray | None) -> list[FloatArray]:
-    """Return the directions in which branches are searched: each one with both signs, and combinations of several.
+    """Return the directions to search for branches: each one with both signs, and combinations of several.
 
     Where a wheel loses its symmetry by forward and backward waves at once, there are two directions, and every combination solves the
-    linear equations. Branches have the combinations that are symmetric about a sector or about the middle between two: where the first
-    sector (without a wheel, the first coordinate) moves most, where it moves least, and halfway between.
+    linear equations. Branches have combinations that are symmetric about a sector or about the middle between two: with the largest motion
+    of the first sector (without a wheel, of the first coordinate), with the smallest, and their sum.
     """
     found = list(directions)
     if len(directions) > 1:
@@ -428,7 +428,7 @@ def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray
 def first_point(
     balance: HarmonicBalance, point: Point, direction: FloatArray, following: Following, end: float
 ) -> Point | None:
-    """Return the first point of the branch that leaves in a direction, with its tangent away from the known branch; None if none is found."""
+    """Return the first point of the branch in a direction, with its tangent away from the known branch; None without convergence."""
     measure = measure_at(point.x, following)
     unit = direction / measure.of(direction)
     for away in AWAY:

@@ -1,18 +1,17 @@
 """Continuation of periodic motions with adaptive harmonics: start, predict, correct, judge, adapt, recover.
 
-A branch is followed by arc length, or from one listed value of the parameter to the next. What is solved at each point is one of a few
-*levels*, the same equation with more and more harmonics (one level alone: harmonics stay as they are). Harmonics change along the branch:
+A branch is followed by arc length, or from one listed value of the parameter to the next. Each point is solved on one of a few *levels*: the
+same equation with increasing harmonics (with one level, harmonics are fixed). A point is *quiet* if its estimated error is below the threshold.
+The level changes along the branch:
 
-- A point whose judgement is not quiet is solved with the harmonics of the next level. Where both agree it stays. Otherwise the point before it,
-  which was quiet, is solved with more, too, and the branch goes on from there: where both levels agree no other sheet can be met.
-- Such second solutions are *audits* of the first ones. Others are made at every tenth point and beside each maximum, wherever a level
-  is not the last one and something acts on the harmonics left out. An audit that fails throws the branch back to the last one that held, and the branch
-  goes on from there with more harmonics.
-- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the wait for the next one.
+- A point that is not quiet is solved on the next level. If both solutions agree, the point is kept. Otherwise the previous point, which was quiet,
+  is solved on the next level, too, and the branch continues from there: where both levels agree, the branch stays on the same sheet.
+- Such second solutions are *audits*. Further audits are made at every tenth point and near each maximum, unless the level is the last one or no force
+  acts on the neglected harmonics. After a failed audit, the branch goes back to the last point that passed, and continues from there with more harmonics.
+- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the number of points until the next one.
 
-A branch that cannot be followed, or that gains no parameter for long, is taken up a little further on; so is one that runs back beside itself
-and tells nothing new, which is forgotten. Values that were not found are looked
-for once more, when their neighbours are known.
+A branch that is lost, or that makes no progress in the parameter for long, is restarted a little further on. A branch that runs back beside itself
+without new information is deleted and restarted, too. Failed values are tried once more when their neighbours are known.
 """
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -37,15 +36,17 @@ from stickslip.response.continuation.continuation_steps import (
 )
 from stickslip.solve.fallbacks import steps_at_most
 
-AUDITED = 10  # points at most from one audit to the next
+AUDITED = 10  # largest number of points between audits
 CALM = 3  # quiet points with many harmonics before fewer are tried
-LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
-LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
-MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
-LATER = 0.2  # share of the effort at a value for when its neighbours are known, and for its motion in time
-STRETCHES = 3.0  # times the work of one stretch of a branch, for all of them
-LONGEST_CALM = 48  # the same after trials that failed
-MAX_BRANCH_LENGTH = 40  # multiples of the smallest number of points at which any branch ends
+LEAPS = (1.0, 0.25, 0.05)  # distances of a restart beyond a lost branch, in steps
+LADDER = (
+    1  # last level with all globalisations: on higher levels they cost too much, and solutions follow from lower ones
+)
+MOST_PATIENT = 16  # largest number of points between attempts to raise harmonics where higher levels have no branch
+LATER = 0.2  # share of the effort at a value that is reserved until its neighbours are known, and for time integration
+STRETCHES = 3.0  # budget of a whole branch over the budget of a stretch
+LONGEST_CALM = 48  # largest such number after failed trials
+MAX_BRANCH_LENGTH = 40  # largest number of solutions on a branch, over the smallest number of points
 
 
 def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterator[Followed]:
@@ -70,13 +71,13 @@ def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterato
 
 @dataclass(slots=True, eq=False)
 class _Stop:
-    """A point of the branch, the start of its continuation, and whether more harmonics have confirmed it."""
+    """Point of the branch, start of its continuation, and whether more harmonics have confirmed it."""
 
     point: Followed
     ahead: Followed
     audited: bool = False
-    more: Followed | None = None  # its audit, if it was made before the branch needed it
-    begins: bool = False  # whether no branch led here
+    more: Followed | None = None  # audit, if it was made in advance
+    begins: bool = False  # whether a stretch of the branch begins here
 
 
 Taken = Generator[Followed, None, Followed]
@@ -89,17 +90,17 @@ class _Walk:
     stored: Iterator[Followed]
     branch: list[_Stop] = field(default_factory=list)
     quiet_for: int = 0  # points since harmonics were raised
-    calm: int = CALM  # of them before fewer are tried
+    calm: int = CALM  # number of them before fewer are tried
     hold: int = 0  # index up to which fewer are not tried
-    given_up: set[int] = field(default_factory=set)  # indices whose audit failed for good
-    patience: int = 1  # points between attempts to raise what cannot be raised
+    given_up: set[int] = field(default_factory=set)  # indices with a finally failed audit
+    patience: int = 1  # points between attempts to raise harmonics after failures
     patient_until: int = 0  # index of the next attempt
     looked: int = 0  # index of the last audit
-    anew_from: int = 0  # index from which solutions without a branch are looked for again
+    anew_from: int = 0  # index from which solutions without a branch are sought again
     taken: int = 0
     tried: dict[tuple[float, int], float] = field(default_factory=dict)  # effort at a value, level
     spent: float = 0.0  # work, in the unit of `Curve.cost`
-    forgotten: int = 0  # points that told nothing new, whose work is in that
+    forgotten: int = 0  # deleted points, whose work is included
     before: int = 0  # points before the present stretch of the branch,
     spent_before: float = 0.0  # and their work
 
@@ -121,7 +122,7 @@ class _Walk:
                 continue
             if made.converged:
                 anew = (yield from self._anew(made)) if trying else None
-                if trying:  # nothing is near with more harmonics: not every point of such a branch is worth the attempt
+                if trying:  # no solution with more harmonics is near: attempts become rarer
                     self.patience = min(2 * self.patience, MOST_PATIENT)
                     self.patient_until = len(self.branch) + self.patience
                 yield from self._kept(anew or made)
@@ -144,22 +145,22 @@ class _Walk:
             yield known
             known = self.curve.stored(known)
         steps, place = known.point.solution.iterations, (known.p, known.level)
-        before = 0.0 if known.kind == "found" else self.tried.get(place, 0.0)  # that is in its own
+        before = 0.0 if known.kind == "found" else self.tried.get(place, 0.0)  # a found solution includes earlier steps
         self.tried[place] = before + steps / steps_at_most(known.point.x.size)
         self.spent += steps * self.curve.cost(known.level)
         return known
 
     def _onward(self, here: _Stop) -> Followed:
-        """Take a step along the branch; one that only goes back where the branch came from is none."""
+        """Take a step along the branch; a step back along the known branch counts as failed."""
         made = onward(self.curve, here.ahead, len(self.branch), self._target(), self.route.last)
         before = [] if self.route.listed else [s.point for s in self.branch if s.point.converged]
         return lost(made) if retraced(self.curve, before, made) else made
 
     def _kept(self, made: Followed, audit: Followed | None = None, *, begins: bool = False) -> Iterator[Followed]:
-        """Accept a point, and look at it or at the one before more closely where that is due."""
+        """Accept a point, and audit it or the previous one where due."""
         silent = made.judged.bound == 0.0
         self.branch.append(_Stop(made, made, silent or audit is not None, audit, begins))
-        if not made.converged or self.curve.levels == 1:  # alone, it is compared with nothing
+        if not made.converged or self.curve.levels == 1:  # nothing to compare with
             return
         if audit is not None or self.curve.quiet(made.level, made.judged):
             self.quiet_for += 1
@@ -173,7 +174,10 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        """Return the number of allowed levels: each stretch has its own budget, so a hard one leaves enough for later ones, and all together have `STRETCHES` times as much."""
+        """Return the number of allowed levels by the budgets of the present stretch and of all stretches together.
+
+        Each stretch has its own budget, so that a hard one leaves enough for later ones; all together have `STRETCHES` times as much.
+        """
         points = len(self.branch) + self.forgotten + 1
         own = levels_left(self.curve, self.route, max(points - self.before, 1), self.spent - self.spent_before)
         return min(own, levels_left(self.curve, self.route, points, self.spent / STRETCHES))
@@ -182,7 +186,7 @@ class _Walk:
         return self._levels() <= MIN_LEVELS < self.curve.levels
 
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
-        """Continue with fewer harmonics where the budget of higher ones is spent."""
+        """Continue with fewer harmonics if the budget of higher levels is spent."""
         level, index = self._levels() - 1, len(self.branch) - 1
         if here.ahead.level > level and index >= self.hold:
             known = here.ahead
@@ -195,7 +199,7 @@ class _Walk:
     # --- harmonics ----------------------------------------------------------------------------
 
     def _raised(self, made: Followed) -> Generator[Followed, None, bool]:
-        """Raise the harmonics of a point that needs more or was not found; return whether the branch continues."""
+        """Raise the harmonics of a point that needs more or failed; return whether the branch continues."""
         level, index = made.level + 1, len(self.branch)
         if level >= self._levels():
             return False
@@ -210,7 +214,7 @@ class _Walk:
         if not held:
             return (yield from self._thrown_back(last, level))
         if check is None or not check.converged or not self.curve.near(made, check):
-            return True  # the branch with more harmonics leads on from the last point
+            return True  # the branch continues from the last point with more harmonics
         known = check
         more = yield from self._take(lambda: accepted(self.curve, known, index))
         if not self.curve.quiet(more.level, more.judged) and (yield from self._raised(more)):
@@ -219,7 +223,7 @@ class _Walk:
         return True
 
     def _compared(self, index: int, level: int) -> Generator[Followed, None, bool]:
-        """Audit a point with the harmonics of a level; return whether it passed, and continue from the audit in that case."""
+        """Audit a point on a level; if it passes, continue from the audit; return whether it passed."""
         stop = self.branch[index]
         if stop.ahead.level >= level:
             return True
@@ -234,7 +238,7 @@ class _Walk:
         return False
 
     def _audited(self, index: int) -> Iterator[Followed]:
-        """Audit a point of the branch; go back where it fails."""
+        """Audit a point of the branch; go back if it fails."""
         stop = self.branch[index]
         level = stop.point.level + 1
         if stop.audited or level >= self._levels() or index in self.given_up:
@@ -264,7 +268,7 @@ class _Walk:
                 self.quiet_for, self.hold = 0, index + CALM
                 return True
             break
-        # nothing before it is sure: begin where this stretch of the branch began
+        # no earlier point is confirmed: restart at the beginning of this stretch
         known = self.branch[begin].ahead
         if known.level < level and begin not in self.given_up:
             audit = yield from self._take(lambda: again(self.curve, "audit", known, begin, level))
@@ -278,7 +282,7 @@ class _Walk:
         return False
 
     def _beginning(self, index: int) -> int:
-        """Return the index at which the stretch of the branch that leads to `index` began."""
+        """Return the index of the beginning of the stretch that contains `index`."""
         for place in range(index, 0, -1):
             if self.branch[place].begins:
                 return place
@@ -297,19 +301,19 @@ class _Walk:
             self.calm = min(2 * self.calm, LONGEST_CALM)
         self.quiet_for = 0
 
-    # --- where to look closer -----------------------------------------------------------------
+    # --- audits -------------------------------------------------------------------------------
 
     def _due(self) -> bool:
-        """Whether the last audit is long ago, or this is the first or the last point."""
+        """Whether an audit is due: after many points without one, and at the first and the last point."""
         last = len(self.branch) - 1
         recent = any(stop.audited for stop in self.branch[max(last - AUDITED + 1, 0) :])
         ends = last == 0 or self.branch[-1].point.p == self.route.last
         return ends or not (recent or self.looked > last - AUDITED)
 
-    # --- the way ------------------------------------------------------------------------------
+    # --- route --------------------------------------------------------------------------------
 
     def _target(self) -> float | None:
-        """Return the next listed value; None where the branch is followed by arc length."""
+        """Return the next listed value; None for continuation by arc length."""
         listed = self.route.listed
         return listed[len(self.branch)] if listed else None
 
@@ -320,7 +324,7 @@ class _Walk:
         return reached or self.taken > MAX_BRANCH_LENGTH * self.route.points
 
     def _idle(self) -> bool:
-        """Whether the branch is left; what ran back beside it is forgotten."""
+        """Whether to leave the branch; points that run back beside it are deleted."""
         if self.route.listed or not self.route.leaves:
             return False
         begin = self._beginning(len(self.branch) - 1)
@@ -330,7 +334,10 @@ class _Walk:
         return back > 0 or self.route.idle([s.point.p for s in self.branch])
 
     def _begun(self, p: float) -> Iterator[Followed]:
-        """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
+        """Restart where no branch leads, and raise the harmonics until the point is quiet.
+
+        The first attempts start from the last point a little further on, the last one uses all globalisations.
+        """
         index, near = len(self.branch), self._last()
         self.before, self.spent_before = index + self.forgotten, self.spent
         here = near[0].level if near and not self._spent_up() else 0
@@ -354,7 +361,7 @@ class _Walk:
         yield from self._kept(made, begins=True)
 
     def _in_place(self, made: Followed) -> Generator[Followed, None, Followed | None]:
-        """Give a point that no other leads to the harmonics of the next level; None where that is not found."""
+        """Solve the first point of a stretch on the next level; None without a solution."""
         index, level = len(self.branch), made.level + 1
         if level >= self._levels():
             return None
@@ -364,7 +371,7 @@ class _Walk:
         return (yield from self._anew(made))
 
     def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
-        """Solve a point without a solution with more harmonics by all methods; in a row of such points only now and then."""
+        """Solve a point on the next level by all methods after a failure; in a row of such points only occasionally."""
         index, level = len(self.branch), made.level + 1
         if level >= self._levels() or index < self.anew_from or self._spent_up():
             return None

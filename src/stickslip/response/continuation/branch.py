@@ -13,10 +13,10 @@ from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.newton_method import Newton, Solution
 
 LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
-IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
-# points that it is given in any case: a sharp resonance takes some tens of them, however few were asked for
+IDLE = 2.0  # points without progress by a step, over the smallest number of points, after which a branch is left
+# smallest such number of points: a sharp resonance takes some tens, however few are requested
 PATIENCE = 80
-BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
+BACKWARD = 0.1  # distance of a branch behind its start, over the range, at which it is left
 
 Kind = Literal["point", "audit", "trial", "found", "between"]
 
@@ -28,9 +28,9 @@ class Judged:
     Attributes
     ----------
     bound
-        Bound of the relative error; 0 without forces on the neglected harmonics; NaN where it is unknown.
+        Bound of the relative error; 0 without forces on the neglected harmonics; NaN if unknown.
     asked, start
-        Further harmonics and start that a strategy of harmonic selection requests; empty for other judgements.
+        Further harmonics requested by a strategy, and a start for their solution; empty without a request.
     """
 
     bound: float = np.nan
@@ -40,7 +40,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """Solution on the way along a branch, or a failed attempt.
+    """Solution in the continuation of a branch, or a failed attempt.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Followed:
     index
         Position along the branch.
     level
-        Level of its harmonics.
+        Level of the harmonics.
     point
         Solution, tangent and step.
     judged
@@ -74,7 +74,7 @@ class Followed:
 
     @property
     def p(self) -> float:
-        """The parameter."""
+        """Value of the parameter."""
         return self.point.p
 
     def taking(self, seconds: float) -> "Followed":
@@ -83,7 +83,7 @@ class Followed:
 
 
 class Curve(Protocol):
-    """Curve of solutions of one equation with several levels of harmonics. The methods here describe a curve with one level."""
+    """Curve of solutions of one equation with several levels of harmonics; the default methods suit a curve with one level."""
 
     @property
     def levels(self) -> int:
@@ -99,11 +99,11 @@ class Curve(Protocol):
         ...
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at a value without a branch to it, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
+        """Solve at a value that no branch reached, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
         ...
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
-        """Return unknowns of one level as unknowns of another level."""
+        """Convert unknowns from one level to another."""
         return x
 
     def starts(self, known: Followed, to: int) -> list[FloatArray]:
@@ -115,7 +115,7 @@ class Curve(Protocol):
         return 1.0
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
-        """Judge the error of a solution."""
+        """Estimate the error of a solution."""
         return Judged()
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
@@ -123,7 +123,7 @@ class Curve(Protocol):
         return Judged()
 
     def quiet(self, level: int, judged: Judged) -> bool:
-        """Whether a solution needs no more harmonics."""
+        """Whether a solution needs no more harmonics by its estimated error."""
         return True
 
     def agree(self, fewer: Followed, more: Followed) -> bool:
@@ -139,11 +139,11 @@ class Curve(Protocol):
         return True
 
     def stored(self, found: Followed) -> Followed:
-        """Return a solution as restored from the journal, which rounds; an interrupted run continues from it."""
+        """Return a solution in the form in which the journal restores it, so that an interrupted run continues identically."""
         return found
 
     def height(self, found: Followed) -> float:
-        """Return the quantity whose maxima are searched."""
+        """Return the quantity whose maxima are audited."""
         return 0.0
 
 
@@ -152,7 +152,7 @@ Begin = Callable[[float, Sequence[FloatArray], float], Solution]
 
 @dataclass(frozen=True, eq=False)
 class OneLevel(Curve):
-    """A curve whose harmonics stay as they are.
+    """Curve with fixed harmonics.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class OneLevel(Curve):
     way
         Continuation options.
     begin
-        Function that solves at a value without a branch to it, from states that may be near. Its last argument is the effort, as in
+        Function that solves at a value that no branch reached, from nearby states. Its last argument is the effort, as in
         `stickslip.response.continuation.starting_solutions.without_branch`.
     """
 
@@ -178,13 +178,13 @@ class OneLevel(Curve):
         return self.way
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at a value without a branch to it."""
+        """Solve at a value that no branch reached."""
         return self.begin(p, [n.point.x for n in near], effort)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Route:
-    """Range of a branch, and the steps through it.
+    """Parameter range of a branch, and its steps.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ class Route:
     listed
         Values to step through, in their order; empty: continuation by arc length.
     leaves
-        Whether to leave a branch that leads back or makes no progress, and to resume further on. Otherwise it is followed to its end.
+        Whether to leave a branch that leads back or makes no progress, and restart further on. Otherwise it is followed to its end.
     """
 
     first: float
@@ -206,7 +206,7 @@ class Route:
 
     @property
     def forward(self) -> float:
-        """1 where the parameter grows on the way, -1 where it falls."""
+        """1 for a growing parameter, -1 for a falling one."""
         return 1.0 if self.last >= self.first else -1.0
 
     @property
@@ -215,15 +215,15 @@ class Route:
         return (self.last - self.first) / self.points
 
     def before(self, one: float, other: float) -> bool:
-        """Whether one value comes before another on the way."""
+        """Whether one value comes before another along the route."""
         return self.forward * one < self.forward * other
 
     def farthest(self, values: Sequence[float]) -> float:
-        """Return the value that lies farthest along the way."""
+        """Return the value farthest along the route."""
         return max(values, key=lambda p: self.forward * p)
 
     def onward(self, values: Sequence[float]) -> float:
-        """Return the value at which a lost branch through `values` is resumed."""
+        """Return the value at which a lost branch through `values` is restarted."""
         if self.listed:
             return self.listed[len(values)]
         ahead = self.farthest(values) + self.gap
@@ -232,7 +232,7 @@ class Route:
     def idle(self, values: Sequence[float]) -> bool:
         """Whether a branch left the range backwards, or advanced less than a step in its last points.
 
-        Stiff contacts that lift off under little damping fold a branch hundreds of times within a step. It is then left, as a machine
+        Stiff contacts that lift off under little damping may fold a branch hundreds of times within a step. It is then left, as a machine
         would leave it.
         """
         if self.listed or not self.leaves:
@@ -245,8 +245,8 @@ class Route:
 
 
 def steps_through(length: float, points: int) -> StepControl:
-    """Return the step control that takes `points` steps or more through a range of the parameter of some `length`."""
-    # a range of a single frequency has no length, and no step is taken in it
+    """Return the step control with at least `points` steps through a parameter range of this `length`."""
+    # a single frequency has zero length and takes no step
     return StepControl(scale=length / (points * LARGEST) or 1.0, first=0.05, largest=LARGEST)
 
 
@@ -256,14 +256,14 @@ def following_vibration(problem: AnyBalance, control: StepControl, newton: Newto
 
 
 def vibration_weights(problem: AnyBalance) -> FloatArray:
-    """Return the weight of each unknown in the step length, zero for the static part, which would hide the growth of the vibration."""
+    """Return the weight of each unknown in the step length; zero for the static part, which would hide the growth of the vibration."""
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0
     return weights
 
 
 class Placed(Protocol):
-    """Protocol of results with a position along a branch: `Followed`, or its stored form."""
+    """Result with a position along a branch: `Followed`, or its stored form."""
 
     @property
     def kind(self) -> str: ...  # noqa: D102
@@ -276,7 +276,7 @@ P = TypeVar("P", bound=Placed)
 
 
 def branch_of(every: Iterable[P]) -> list[P]:
-    """Return the points of a branch among all results: those that no later result replaced."""
+    """Return the points of a branch among all results, without replaced ones."""
     branch: list[P] = []
     for one in every:
         if one.kind == "point":

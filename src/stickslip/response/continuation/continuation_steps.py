@@ -1,4 +1,4 @@
-"""Single solves of the continuation: a step, a point with other harmonics, a start without a branch."""
+"""Single solutions of the continuation: a step, a point with other harmonics, a start without a branch."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,18 +16,18 @@ from stickslip.solve.newton_method import Solution, charged, first_converged, ne
 from stickslip.solve.status import Status
 
 PATIENT = 16  # iterations from a solution with other harmonics
-RECENT = 12  # points behind the last one that a step may go back along
-RUN_BACK = 8  # points that a branch runs back beside itself before it is left
-BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
+RECENT = 12  # number of last points along which a step may return
+RUN_BACK = 8  # smallest number of points for a branch that runs back beside itself
+BACK = 0.3  # distance from the known branch, over the step, up to which a step returns along it
 
-# work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed;
-# every point adds its share, so that none is judged by how many others were asked for
+# budget of a branch for each point, in Newton steps with the most harmonics; beyond half of it fewer levels are allowed.
+# Every point adds its share, so that the result does not depend on the number of requested points
 EFFORT = 8.0
 MIN_LEVELS = 2  # levels that are always allowed
 
 
 def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
-    """Return the number of usable levels after `points` points and `spent` work: all during the first half of the work, then fewer."""
+    """Return the number of allowed levels after `points` points and `spent` work: all during the first half of the budget, then fewer."""
     levels = curve.levels
     if levels <= MIN_LEVELS:
         return levels
@@ -37,7 +37,7 @@ def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
 
 
 def without_more(curve: Curve, levels: int, made: Followed) -> Followed:
-    """Return a solution judged by fewer harmonics, where no audit will follow: unconfirmed predictions were wrong at times."""
+    """Return a solution with its error estimated from fewer harmonics if no audit can follow, since predictions need a confirmation."""
     last = made.kind != "audit" and 0 < made.level == levels - 1 < curve.levels - 1
     if not (last and made.converged) or made.judged.bound == 0.0:
         return made
@@ -56,7 +56,7 @@ def onward(curve: Curve, here: Followed, index: int, target: float | None, last:
 
 
 def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> Followed:
-    """Solve at the value of a known solution with the harmonics of another level, in the same direction of travel."""
+    """Solve at the value of a known solution on another level, with the same direction along the branch."""
     following, p = curve.following(level), known.p
     latest = Latest(curve.problem(level))
     patient = replace(following.newton, max_iterations=PATIENT)
@@ -72,7 +72,7 @@ def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> 
 
 
 def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
-    """Return an audit as a point of the branch, judged."""
+    """Return an audit as a point of the branch, with its estimated error."""
     latest = Latest(curve.problem(audit.level))
     return _made(curve, "point", index, audit.level, audit.point, latest)
 
@@ -80,7 +80,7 @@ def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
 def fresh(
     curve: Curve, route: Route, index: int, level: int, p: float, near: Sequence[Followed], effort: float
 ) -> Followed:
-    """Solve at a value without a branch to it, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
+    """Solve at a value that no branch reached, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
     solution = curve.fresh(level, p, near, effort)
     latest = Latest(curve.problem(level))
     following = curve.following(level)
@@ -137,7 +137,7 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
 
 
 def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -> int:
-    """Return the number of points at the end of a branch that run back beside it over a step length: all since it turned, or none.
+    """Return the number of points at the end of a branch that run back beside it over a step length: all points after the turn, or 0.
 
     Contacts that lift off many times in a period may cause such a fold on the last level; more harmonics would remove it.
     """
@@ -188,7 +188,7 @@ def _made(curve: Curve, kind: Kind, index: int, level: int, point: Point, latest
 
 
 def _against(curve: Curve, known: Followed, point: Point, level: int) -> bool:
-    """Whether a point of another level looks the other way than a known one."""
+    """Whether the tangent of a point is opposite to a known point's of another level."""
     state = curve.lifted(known.point.tangent[:-1], known.level, level)
     before = np.append(state, known.point.tangent[-1])
     following = curve.following(level)

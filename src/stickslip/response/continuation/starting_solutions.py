@@ -1,4 +1,4 @@
-"""Periodic solutions without a neighbour: a ladder of methods, each with a limit of Newton steps, and homotopies as the last one.
+"""Periodic solutions without a nearby one: a sequence of methods with limited Newton steps, and homotopies as the last one.
 
 In a homotopy the excitation grows first, then the higher harmonics join.
 """
@@ -28,9 +28,9 @@ from stickslip.response.system import System
 from stickslip.solve.fallbacks import Homotopy, solve_robustly, steps_at_most
 from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
 
-# shares of the excitation at which contacts hardly change: the problem is linear there
+# shares of the excitation at which contacts do not change their states: the problem is linear there
 FAINT = (1e-2, 1e-3, 1e-5)
-BACK = 1e-3  # share of the faintest load at which a path has come back to rest
+BACK = 1e-3  # share of the smallest excitation at which a path has returned to rest
 
 
 def without_branch(
@@ -41,7 +41,7 @@ def without_branch(
     near: Sequence[FloatArray] = (),
     effort: float = 1.0,
 ) -> Solution:
-    """Solve at one frequency from several starts: motions nearby, static equilibrium with bonded vibration, few harmonics, `solve_robustly`.
+    """Solve at one frequency from several starts: nearby motions, static equilibrium with bonded vibration, few harmonics, `solve_robustly`.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def without_branch(
     balance
         The periodic problem.
     options
-        Corrector.
+        Corrector options.
     omega
         Frequency, rad/s.
     near
-        (size,) unknowns of motions that may be near.
+        (size,) unknowns of nearby motions.
     effort
-        Share of the Newton steps of `steps_at_most` for all attempts, homotopies and other globalisations included; 0: Newton's method only.
+        Share of the Newton steps of `steps_at_most` for all attempts, including homotopies and other globalisations; 0: Newton's method only.
     """
     starts = _starts(system, balance, options, omega, near)
     if effort:
@@ -79,7 +79,7 @@ def plain_sweep(
     options: Newton,
     over: Callable[[], bool] = bool,
 ) -> list[Followed]:
-    """Return the response of `balance` between two frequencies, in the order of the branch, failed points included.
+    """Return the response of `balance` between two frequencies in the order of the branch, including failed points.
 
     `over` is called after each solution; True ends the sweep.
     """
@@ -101,7 +101,7 @@ def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotop
 
 
 def at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
-    """Return the (1, n_retained) static equilibrium, m; zero at retained coordinates that are not those of the system."""
+    """Return the (1, n_retained) static equilibrium, m; zero at coordinates that only the balance retains."""
     rest = np.zeros((1, balance.linear.n), dtype=complex)
     own = np.searchsorted(balance.linear.retained, system.retained)
     rest[0, own] = preload(system.at(omega), balance.linear.load_at(omega).static)
@@ -111,7 +111,7 @@ def at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
 def _starts(
     system: System, balance: AnyBalance, options: Newton, omega: float, near: Sequence[FloatArray]
 ) -> Iterator[FloatArray]:
-    """Yield scaled unknowns to start Newton from."""
+    """Yield scaled unknowns as starts of Newton's method."""
     yield from near
     guess = balance.coefficients(bonded_start(balance, omega, system))
     guess[:1] = at_rest(system, balance, omega)
@@ -167,7 +167,7 @@ class JoiningHarmonics:
     omega
         Frequency, rad/s.
     higher
-        (m,) one for each row of coefficients that joins, else zero.
+        (m,) one for rows of coefficients that join, zero for others.
     """
 
     balance: HarmonicBalance
@@ -184,7 +184,7 @@ class JoiningHarmonics:
 
 
 def _weighted(period: ContactPeriod, share: FloatArray) -> ContactPeriod:
-    """Return contact forces of which a `share` (m,) acts in the equations of each row of coefficients."""
+    """Return contact forces scaled by a `share` (m,) in the equations of each row of coefficients."""
     return replace(
         period,
         coefficients=share[:, None] * period.coefficients,
@@ -221,7 +221,7 @@ def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterato
     """
     if not isinstance(
         balance, HarmonicBalance
-    ):  # of rigid contacts not linear in the excitation, or not all of the equations
+    ):  # rigid contacts are not linear in the excitation; a local balance lacks some equations
         return
     at_rest = balance.unknowns(static[None].astype(complex))
     growing = growing_load(balance, omega)
@@ -237,6 +237,6 @@ def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterato
 
 
 def lowest_harmonics(balance: AnyBalance) -> tuple[int, ...]:
-    """Return the harmonics up to the highest that is driven, the first at least."""
+    """Return the harmonics up to the highest driven one, and at least up to the first."""
     driven = max(balance.linear.load.harmonics, default=balance.order)
     return tuple(h for h in balance.harmonics if h <= max(driven, 1))

@@ -1,4 +1,4 @@
-"""Bounds of the response over residual tractions, the preloads left in contacts that never slip."""
+"""Bounds of the response over residual tractions, the arbitrary tangential preloads in contacts that never slip."""
 
 import lazy_loader
 

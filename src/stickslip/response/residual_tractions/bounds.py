@@ -1,6 +1,6 @@
-"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance, and their confirmation by other means.
+"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance, and their confirmation by other methods.
 
-Sweeps up and down a wider range find motions of other branches, where laws allow several motions.
+Where laws allow several motions, sweeps up and down a wider range find motions on other branches.
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,24 +41,24 @@ from stickslip.response.time.transient import TimeStepping, integrate
 from stickslip.solve.newton_method import Newton, newton
 
 PEAK_WIDTH = 3e-5  # relative width of the bracket of a resonance
-PEAK_TRIALS = 9  # frequencies that are tried in it
-EQUAL = 1e-6  # relative difference of two bounds that are one
-APART = 1e-3  # relative difference of the amplitudes of two motions from one start that stand on different branches
+PEAK_TRIALS = 9  # largest number of frequencies tried in it
+EQUAL = 1e-6  # relative difference up to which two bounds coincide
+APART = 1e-3  # relative difference in amplitude above which two motions from one start lie on different branches
 
 End = Literal["least", "most"]
-WIDER = 1.3  # the sweeps begin and end at this multiple of the range and its inverse: a branch that bends leads far
-POINTS = 15  # least number of points of a sweep around one frequency; two more for each further one
-ONE = (Bonded, BoucWen, Dahl, Iwan, Jenkins)  # no stop, and friction under a constant normal load
-NORMAL = (CoupledCoulomb, ElasticCoulomb, RegularisedCoulomb)  # the same where k_n is zero
+WIDER = 1.3  # factor by which the sweeps extend the range at both ends: a bent branch leads far
+POINTS = 15  # smallest number of points of a sweep around one frequency; two more for each further one
+ONE = (Bonded, BoucWen, Dahl, Iwan, Jenkins)  # laws without stops, and with friction under a constant normal load
+NORMAL = (CoupledCoulomb, ElasticCoulomb, RegularisedCoulomb)  # the same if k_n is zero
 
-SAMPLES = 1024  # of the march
-ALIKE = 1e-3  # relative difference of the amplitudes by march and by events that sampling explains
-MISSING_HARMONICS_SHARE = 0.05  # of the amplitude in time that the missing harmonics of a bound may account for
+SAMPLES = 1024  # of sampled contact forces
+ALIKE = 1e-3  # relative difference in amplitude between samples and events that is sampling error
+MISSING_HARMONICS_SHARE = 0.05  # largest share of the amplitude in time for the missing harmonics of a bound
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A motion with an extreme amplitude.
+    """Motion with an extreme amplitude.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Bound:
     sliders
         (n_springs, 2) initial slider positions of the springs of `TractionBounds.springs`, m.
     multipliers
-        (n_springs, 2) tractions along t and w at t = 0 as shares of the friction limit there; NaN where a spring does not stick all the time.
+        (n_springs, 2) tractions along t and w at t = 0, over the friction limit; NaN for springs that do not stick throughout.
     error
         Predicted relative change of the output by the harmonics of its judging set; 0 without forces on them, NaN if unknown.
     """
@@ -82,7 +82,7 @@ class Bound:
 
     @property
     def stuck(self) -> int:
-        """Number of springs that stick all the time and so keep a residual traction."""
+        """Number of springs that stick throughout and so keep a residual traction."""
         return int(np.count_nonzero(np.isfinite(self.multipliers)))
 
 
@@ -97,14 +97,14 @@ class TractionBounds:
     reference
         The motion from the model's own start.
     least, most
-        Solutions of the smallest and the largest amplitude.
+        Motions with the smallest and the largest amplitude.
     springs
-        Names of the contacts to which the rows of sliders belong.
+        Name of the contact for each row of the sliders.
     solves, failures
         Number of solved motions, and of starts without a solution.
     branches
-        Number of motions from the model's own start, above one where sweeps up and down met other branches at this frequency. The
-        bounds include them all.
+        Number of motions from the model's own start; above one if sweeps met other branches at this frequency. The bounds include them
+        all.
     """
 
     omega: float
@@ -157,7 +157,7 @@ class _Setup:
         given = TractionState(self.problem, omega, _own_sliders(starts), x)
         if all(getattr(law, "residual_traction", None) is None for law in starts.given.laws):
             return given
-        # a share of the limit says where sliders rest only once the motion is known
+        # a traction given as a share of the limit determines slider positions only for a known motion
         period = self.given.contacts(x, omega)
         force = period.force[:, :2, 0] / starts.interface.factors[:, None]
         rests = period.gap[:, :2, 0] - force / np.maximum(starts.stiffness, 1e-300)
@@ -179,10 +179,10 @@ def traction_bounds(
     search: TractionSearch | None = None,
     near: TractionBounds | None = None,
 ) -> Iterator[TractionBounds]:
-    """Find the smallest and the largest amplitude of an output over all residual tractions of contacts that stick.
+    """Find the smallest and the largest amplitude of an output over all residual tractions of sticking contacts.
 
-    With laws other than friction under a constant normal load, the response may be multi-valued. Sweeps up and down through a wider
-    range then search for other branches, and the bounds hold over all motions that they meet. They do not meet isolated branches.
+    With laws other than friction under a constant normal load, the response may be multi-valued. Sweeps up and down a wider range then
+    search for other branches, and the bounds include all motions that they meet. They do not meet isolated branches.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def traction_bounds(
     load
         Static and harmonic forces on all dofs, N.
     omegas
-        Frequencies, rad/s, with neighbours next to each other: each starts from the previous one.
+        Frequencies in ascending or descending order, rad/s: each starts from the previous one.
     output
         Number of the output of `system`.
     discretisation
@@ -199,12 +199,12 @@ def traction_bounds(
     search
         Options of the search for extremes.
     near
-        Bounds at the frequency before the first one, from which an interrupted search continues.
+        Bounds at the frequency before the first one, to continue an interrupted search.
 
     Yields
     ------
     TractionBounds
-        Bounds at each frequency; not `converged` where no motion is found from the model's own start.
+        Bounds at each frequency; not `converged` if no motion is found from the model's own start.
 
     Raises
     ------
@@ -235,26 +235,24 @@ def resonance_bounds(
     discretisation: Discretisation | None = None,
     search: TractionSearch | None = None,
 ) -> TractionBounds:
-    """Find the highest point of a bound between frequencies at which it is known: the bound of the resonance amplitude.
+    """Find the maximum of a bound over the frequency, between known bounds: the bound of the resonance amplitude.
 
-    Where several motions were met, the highest point of either curve is that over all of them.
-
-    Whatever tractions there are at each frequency, and whether or not they change from one to the next, the resonance is at least as
-    high as the highest point of the smallest amplitudes and at most as high as that of the largest ones.
+    For any tractions, constant or changing with the frequency, the resonance amplitude lies between the maximum of the smallest amplitudes
+    and the maximum of the largest ones. Where several motions were met, both bounds include all of them.
 
     Parameters
     ----------
     system, load, output, discretisation, search
-        As of `traction_bounds`.
+        As in `traction_bounds`.
     known
         Bounds at increasing frequencies.
     end
-        ``least`` or ``most``: which bound.
+        The bound, ``least`` or ``most``.
 
     Returns
     -------
     TractionBounds
-        At the highest point; the highest of `known` where that is the first or the last one.
+        Bounds at the maximum; the highest of `known` if this is the first or the last one.
 
     Raises
     ------
@@ -283,7 +281,7 @@ def resonance_bounds(
     scipy.optimize.minimize_scalar(
         depth, bounds=limits, method="bounded", options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS}
     )
-    for omega in _highest(setup, *limits):  # a bound that ends at a fold has a jump there
+    for omega in _highest(setup, *limits):  # a bound jumps at a fold
         depth(omega)
     best = max(found.values(), key=lambda e: float(getattr(e, end).amplitude))
     if getattr(best, end).amplitude <= heights[top]:
@@ -323,7 +321,7 @@ def _at(setup: _Setup, omega: float, search: TractionSearch | None, *beside: Ext
 
 
 def _highest(setup: _Setup, low: float, high: float) -> list[float]:
-    """Return the frequency between two others at which the swept branches are highest; none where nothing was swept."""
+    """Return the frequency between two others at which the swept branches are highest; empty without a sweep."""
     balance, driven = setup.given, setup.problem.driven
     inside = [f for way in setup.swept for f in way if f.converged and low < f.p < high]
     inside.sort(key=lambda f: float(np.linalg.norm(driven.motion(balance, f.point.x))))
@@ -331,7 +329,7 @@ def _highest(setup: _Setup, low: float, high: float) -> list[float]:
 
 
 def _swept(setup: _Setup, omegas: Sequence[float]) -> _Setup:
-    """Return a setup that knows the branches around some frequencies."""
+    """Return the setup with branches swept around some frequencies."""
     swept = both_ways(setup.system, setup.given, omegas, setup.problem.newton)
     return replace(setup, swept=swept)
 
@@ -375,7 +373,7 @@ def _bound(state: TractionState) -> Bound:
 
 
 def may_be_several(interface: Interface) -> bool:
-    """Whether a law of an interface is more than friction under a constant normal load, which alone leaves one branch."""
+    """Whether a law of an interface allows several branches: it is more than friction under a constant normal load."""
     return not all(_leaves_one(law) for law in interface.laws)
 
 
@@ -395,7 +393,7 @@ def both_ways(
 def crossings(
     branches: Sequence[Sequence[Followed]], balance: HarmonicBalance, omega: float, options: Newton
 ) -> Iterator[FloatArray]:
-    """Yield the unknowns of every crossing of a branch with a frequency; the same motion may occur several times."""
+    """Yield the unknowns at every crossing of a branch with a frequency; the same motion may occur several times."""
     for branch in branches:
         for one, other in pairwise(branch):
             if not (one.converged and other.converged) or (one.p - omega) * (other.p - omega) > 0.0:
@@ -409,16 +407,16 @@ def crossings(
 
 @dataclass(frozen=True)
 class Confirmation:
-    """Checks of a bound by other means.
+    """Checks of a bound by other methods.
 
     Attributes
     ----------
     resolved
         Amplitude by sampled contact forces from the same initial sliders, m; NaN without a solution.
     transient
-        Amplitude by time integration from the bound's state and tractions, m; NaN where it diverged or was not run.
+        Amplitude by time integration from the bound's state and tractions, m; NaN if it diverged or was not run.
     status
-        Status of the time integration; empty where it was not run.
+        Status of the time integration; None if it was not run.
     periods
         Number of integrated periods.
     agrees
@@ -442,12 +440,12 @@ def confirmed(
     discretisation: Discretisation | None = None,
     stepping: TimeStepping | None = None,
 ) -> Confirmation:
-    """Solve a bound again and follow its motion in time, started with its displacements, velocities and tractions.
+    """Solve a bound again with sampled contacts, and integrate its motion in time from its displacements, velocities and tractions.
 
     Parameters
     ----------
     system, load, output, discretisation
-        As of `traction_bounds`.
+        As in `traction_bounds`.
     omega
         Frequency of the bound, rad/s.
     bound
@@ -461,7 +459,7 @@ def confirmed(
     linear = system.condensed(load, how.order, dof)
     balance = harmonic_balance(linear, interface, how.order, max(how.samples, SAMPLES), "march")
     start = balance.unknowns(bound.coefficients[:, linear.retained])
-    # near an event a march has steps, between which no residual is as small as Newton's method asks for
+    # near an event, sampled forces are discontinuous, so that the residual may not reach the tolerance
     found = newton(
         lambda x: balance.linearise(x, omega), start, replace(how.newton, tolerance=max(how.newton.tolerance, 1e-8))
     )

@@ -1,8 +1,8 @@
-"""The periodic motion as a function of the slider positions, and the gradient of an amplitude.
+"""Periodic motion as a function of the slider positions, and the gradient of an amplitude.
 
-The sliders s enter through the gaps alone, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact
-derivatives that belongs to the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs
-that slip, open, or were dragged to where they stick have forgotten their start: their column is zero.
+The sliders s enter through the gaps only, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact derivatives
+for the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs that slip, open, or were dragged to
+their position have forgotten their start: their column is zero.
 
 The admissible slider positions of a planar contact are the intersection of the discs of all instants: in units of force the slider is at
 ``z = K s``, and rests while ``|K x(t) - z| <= μN(t)``.
@@ -27,30 +27,30 @@ from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
 
-ALERT_TOLERANCE = 1e-6  # relative residual of the step that predicts what more harmonics change
-HALVINGS = 4  # of the way between two starts where Newton does not come from one to the other
-INSIDE = 1e-7  # of the room of a spring: how far from its walls a slider is put for a gradient
-RESTS = 1e-7  # of the largest stretch: movement of a slider over a period that counts as none
-CENTRING = 200  # steps to a place deep in all discs
-RAYS = 720  # on which the edge is looked for
-CLOSER = 2  # times that the best ray is looked at with rays a hundredth as far apart
+ALERT_TOLERANCE = 1e-6  # relative residual of the predicting step with more harmonics
+HALVINGS = 4  # of the path between two starts after a failure of Newton's method
+INSIDE = 1e-7  # distance of a slider from the ends of its interval for a gradient, over the half width
+RESTS = 1e-7  # movement of a slider over a period, over the largest stretch, up to which it rests
+CENTRING = 200  # steps to a point deep inside all discs
+RAYS = 720  # in the search for the edge
+CLOSER = 2  # refinements about the best ray, with rays a hundredth as far apart
 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """The positions at which the sliders of a motion may rest without being moved.
+    """Admissible rest positions of the sliders of a motion.
 
     Attributes
     ----------
     sticks
-        (n, 2) whether a spring sticks all the time, so that it keeps its start.
+        (n, 2) whether a spring sticks throughout, so that its slider keeps its start.
     slider
-        (n, 2) where it rests; zero for others, m.
+        (n, 2) rest position, m; zero for other springs.
     middle, half
-        (n, 2) middle and half width of the interval in which the slider may rest, m; of a planar contact a place deep in all its discs
-        and how deep it is.
+        (n, 2) middle and half width of the interval in which the slider may rest, m; for a planar contact, a point deep inside all discs and
+        its distance from the edge.
     multiplier
-        (n, 2) traction at t = 0 as a share of the friction limit there; NaN for springs that do not stick.
+        (n, 2) traction at t = 0 over the friction limit; NaN for springs that do not stick.
     centres, limits
         (n, 2, samples) tangential gaps, m, and (n, samples) friction limits, N.
     """
@@ -66,16 +66,16 @@ class Room:
 
 @dataclass(frozen=True, eq=False)
 class TractionState:
-    """A periodic motion that was reached from a start.
+    """Periodic motion from initial slider positions.
 
     Attributes
     ----------
     problem
-        Problem that it solves.
+        The solved problem.
     omega
         Frequency, rad/s.
     sliders
-        (n, 2) where the springs started, m.
+        (n, 2) initial slider positions, m.
     x
         Scaled unknowns.
     """
@@ -87,7 +87,7 @@ class TractionState:
 
     @property
     def amplitude(self) -> float:
-        """Norm of the output over the harmonics that the load drives, m."""
+        """Norm of the output over the driven harmonics, m."""
         return float(np.linalg.norm(self.problem.driven.motion(self.problem.balance, self.x)))
 
     @property
@@ -98,13 +98,13 @@ class TractionState:
 
     @cached_property
     def room(self) -> Room:
-        """Return the actual and the possible rest positions of the sliders."""
+        """Actual and admissible rest positions of the sliders."""
         balance = self.problem.at(self.sliders)
         return room_of(self.problem.starts, balance.contacts(self.x, self.omega))
 
     @property
     def error(self) -> float:
-        """Predicted relative change of the output by the judging set; 0 without forces on it, NaN where a wheel lacks these waves."""
+        """Predicted relative change of the output by the judging set; 0 without forces on it, NaN if a wheel lacks their waves."""
         problem = self.problem
         low = problem.at(self.sliders)
         high = judging_balance(low)
@@ -116,7 +116,7 @@ class TractionState:
         return jacobian_alert(low, high, self.x, self.omega, measure, solve).error
 
     def inside(self) -> FloatArray:
-        """Return the sliders (n, 2) with those at a wall put a little inside, where their spring can be pulled either way."""
+        """Return the sliders (n, 2), moved slightly inside if they are at an end of their interval, so that the gradient is two-sided."""
         room = self.room
         off = room.slider - room.middle
         most = (1.0 - INSIDE) * room.half
@@ -126,7 +126,7 @@ class TractionState:
         return np.where(room.sticks, inner, self.sliders)
 
     def farthest(self, slope: FloatArray) -> FloatArray:
-        """Return the place (n, 2) of each slider at which it rests still and ``slope · s`` is largest, m; unmoved where the slope is zero."""
+        """Return the admissible positions (n, 2) with the largest ``slope · s``, m; sliders with zero slope are not moved."""
         room, starts = self.room, self.problem.starts
         end = room.middle + np.sign(slope) * room.half
         for c in np.flatnonzero(starts.planar & np.any(slope != 0.0, axis=1)):
@@ -139,7 +139,7 @@ class TractionState:
         return np.where(room.sticks & (slope != 0.0), end, room.slider)
 
     def gradient(self) -> tuple[FloatArray, float]:
-        """Return (n, 2) the derivatives of ``ln A`` by the sliders, 1/m, and that by ``ln ω``."""
+        """Return the (n, 2) derivatives of ``ln A`` by the sliders, 1/m, and the derivative by ``ln ω``."""
         problem, balance = self.problem, self.problem.at(self.sliders)
         period = balance.forces(self.x, self.omega)
         at = balance.linearise(self.x, self.omega, period)
@@ -172,15 +172,15 @@ class TractionProblem:
     Parameters
     ----------
     balance
-        Balance of `starts.interface`, whose springs have no initial positions of their own.
+        Balance of `starts.interface`, whose springs have no initial positions.
     starts
         The springs.
     driven
-        The output among the retained coordinates, in the harmonics that the load drives.
+        The output among the retained coordinates, in the driven harmonics.
     newton
-        Corrector.
+        Corrector options.
     spent
-        Counts of what was solved.
+        Numbers of solves and failures.
     """
 
     balance: HarmonicBalance
@@ -190,13 +190,13 @@ class TractionProblem:
     spent: Spent = field(default_factory=Spent)
 
     def at(self, sliders: FloatArray) -> HarmonicBalance:
-        """Return the periodic problem whose springs start from `sliders` (n, 2)."""
+        """Return the periodic problem with initial slider positions `sliders` (n, 2)."""
         moved = np.zeros((len(sliders), 3))
         moved[:, :2] = np.where(self.starts.stiffness > 0.0, sliders, 0.0)
         return replace(self.balance, compiled=replace(self.balance.compiled, sliders=moved))
 
     def solved(self, sliders: FloatArray, omega: float, near: Iterable[TractionState]) -> TractionState | None:
-        """Return the motion from a start, from the first of the motions `near` that leads there; None if none does."""
+        """Return the motion for initial sliders, from the first of the motions `near` that converges; None without convergence."""
         for begin in near:
             found = self._from(sliders, omega, begin, HALVINGS)
             if found is not None:
@@ -218,7 +218,7 @@ class TractionProblem:
 
 
 def room_of(starts: Starts, period: ContactPeriod) -> Room:
-    """Return where the sliders of a motion rest and might rest, from its contacts over a period of samples."""
+    """Return the actual and admissible rest positions of the sliders, from sampled contacts over a period."""
     factors = starts.interface.factors
     gap, force = period.gap[:, :2], period.force / factors[:, None, None]
     stiffness = np.maximum(starts.stiffness, 1e-300)[:, :, None]
@@ -227,7 +227,7 @@ def room_of(starts: Starts, period: ContactPeriod) -> Room:
     reach = limit[:, None, :] / stiffness
     sliders = gap - force[:, :2] / stiffness
     slider = sliders[:, :, 0]
-    # a slider that was dragged until it is only just touched rests but for rounding, whatever state a sample is said to be in
+    # a slider that was dragged to the end of its interval rests up to rounding, whatever the state of a sample
     sticks = springs & (np.ptp(sliders, axis=2) <= RESTS * np.max(reach, axis=2))
     sticks[starts.planar] &= np.all(sticks[starts.planar] | ~springs[starts.planar], axis=1)[:, None]
     low, high = np.max(gap - reach, axis=2), np.min(gap + reach, axis=2)
@@ -250,7 +250,7 @@ def room_of(starts: Starts, period: ContactPeriod) -> Room:
 
 
 def in_all_discs(centres: FloatArray, radii: FloatArray) -> tuple[FloatArray, float]:
-    """Return a place (2,) deep inside all discs of `centres` (2, n) and `radii` (n,), and its distance from the nearest edge."""
+    """Return a point (2,) deep inside all discs of `centres` (2, n) and `radii` (n,), and its distance from the nearest edge."""
     at = centres.mean(axis=1)
     best, depth = at, -np.inf
     for step in range(CENTRING):
@@ -265,16 +265,16 @@ def in_all_discs(centres: FloatArray, radii: FloatArray) -> tuple[FloatArray, fl
 
 
 def farthest_in_discs(inside: FloatArray, centres: FloatArray, radii: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return the place (2,) in all discs at which ``slope · z`` is largest.
+    """Return the point (2,) in all discs with the largest ``slope · z``.
 
     Parameters
     ----------
     inside
-        (2,) a place in all of them.
+        (2,) point inside all discs.
     centres, radii
-        (2, n) and (n,) of the discs.
+        (2, n) centres and (n,) radii of the discs.
     slope
-        (2,) not zero.
+        (2,) nonzero gradient.
     """
     away = inside[:, None] - centres
     room = radii**2 - np.sum(away**2, axis=0)

@@ -1,8 +1,8 @@
 """Smallest and largest amplitude over all slider positions, by adjoint gradients from several starts.
 
-Where a contact is pushed beyond the interval in which it may rest, the motion drags it back to the end. Every start is therefore
-admissible, and the ends of the intervals, at which extremes lie as a rule, are reached by going too far: a step goes to where the gradient
-points in each spring, all the way first, then by halves.
+If a slider starts beyond the interval in which it may rest, the motion drags it back to the end. Every start is therefore admissible. Extremes
+usually lie at ends of the intervals, which are reached by overshooting: a step goes along the gradient of each spring, first in full, then in
+shorter fractions.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,13 +15,13 @@ from stickslip.arrays import FloatArray
 from stickslip.response.residual_tractions.problem import TractionProblem, TractionState
 from stickslip.units import check_quantities, quantity
 
-GAIN = 1e-7  # relative change of the amplitude that counts as one
-BEYOND = 4.0  # half widths behind the end of an interval, to where a step aims
-PLANAR = 2.0  # times the way to the end, to where it aims in a planar contact
-LENGTHS = (1.0, 0.5, 0.2, 0.05, 0.01)  # of the way there
-CLIMBED = 8  # starts from which either extreme is climbed to, the best ones
+GAIN = 1e-7  # smallest relative change of the amplitude that counts
+BEYOND = 4.0  # target of a step from the middle of an interval, in half widths
+PLANAR = 2.0  # target of a step in a planar contact, over the distance to the edge
+LENGTHS = (1.0, 0.5, 0.2, 0.05, 0.01)  # tried fractions of a step
+CLIMBED = 8  # largest number of ascents to each extreme, from the best starts
 MOST_STEPS = 30  # of one ascent
-ALL_CORNERS = 4  # springs up to which every corner is a start
+ALL_CORNERS = 4  # largest number of springs for which every corner is a start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +31,8 @@ class TractionSearch:
     Parameters
     ----------
     starts
-        Number of random starts, in addition to the fixed ones: the model's own, all springs at one end of their intervals and all at
-        the other, and every corner for few springs.
+        Number of random starts in addition to the fixed ones: the model's own start, all springs at one end of their intervals, all at the
+        other end, and every corner for few springs.
     seed
         Seed of the random numbers.
     """
@@ -46,7 +46,7 @@ class TractionSearch:
 
 @dataclass(frozen=True, eq=False)
 class Extremes:
-    """The motions with the smallest and the largest amplitude that were found, and on how many branches."""
+    """Motions with the smallest and the largest amplitude found, and the number of branches."""
 
     reference: TractionState
     least: TractionState
@@ -72,7 +72,7 @@ def extremes(reference: TractionState, search: TractionSearch | None, more: Iter
     own = () if search is None else _starts(reference, search)
     for sliders, shares in [*given, *own]:
         begun = problem.solved(sliders, reference.omega, (reference, *seen))
-        if begun is not None and shares is not None:  # its limits are others than those of the reference
+        if begun is not None and shares is not None:  # its friction limits differ from the reference
             again = sliders_at(begun, shares)
             begun = problem.solved(again, reference.omega, (begun, reference)) or begun
         if begun is not None and not any(_same(begun, other) for other in seen):
@@ -85,7 +85,7 @@ def extremes(reference: TractionState, search: TractionSearch | None, more: Iter
 
 
 def _best(seen: Sequence[TractionState], sense: float) -> list[TractionState]:
-    """Return the motions from which an extreme is climbed to: the best ones, one of each amplitude."""
+    """Return the starting motions of the ascents to an extreme: the best ones, one of each amplitude."""
     found: list[TractionState] = []
     for state in sorted(seen, key=lambda s: -sense * s.amplitude):
         if all(abs(np.log(state.amplitude / other.amplitude)) > GAIN for other in found):
@@ -94,7 +94,7 @@ def _best(seen: Sequence[TractionState], sense: float) -> list[TractionState]:
 
 
 def _same(one: TractionState, other: TractionState) -> bool:
-    """Whether two motions rest at the same places."""
+    """Whether two motions are equal and have the same sticking springs."""
     a, b = one.room, other.room
     if not np.array_equal(a.sticks, b.sticks):
         return False
@@ -103,7 +103,7 @@ def _same(one: TractionState, other: TractionState) -> bool:
 
 
 def _starts(reference: TractionState, search: TractionSearch) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield slider positions and their shares of the limits at t = 0 in the reference: all limits, corners, and random ones."""
+    """Yield slider positions at the limits, at corners and at random, with their shares of the friction limits at t = 0 in the reference."""
     problem = reference.problem
     springs = problem.starts.stiffness > 0.0
     count = int(np.count_nonzero(springs))
@@ -122,7 +122,10 @@ def _starts(reference: TractionState, search: TractionSearch) -> Iterator[tuple[
 
 
 def sliders_at(state: TractionState, shares: FloatArray) -> FloatArray:
-    """Return the sliders (n, 2) that stretch the springs of a motion by shares (n, 2) of their limits at t = 0; of a planar contact by the vector of them, at most one long."""
+    """Return the sliders (n, 2) that stretch the springs of a motion by shares (n, 2) of their limits at t = 0.
+
+    For a planar contact the shares form a vector, whose length is limited to one.
+    """
     problem = state.problem
     starts = problem.starts
     period = problem.at(state.sliders).contacts(state.x, state.omega)
@@ -134,7 +137,7 @@ def sliders_at(state: TractionState, shares: FloatArray) -> FloatArray:
 
 
 def _ascended(begin: TractionState, sense: float) -> TractionState:
-    """Climb (or descend, with `sense` -1) from a motion until no step changes the amplitude any more."""
+    """Ascend (or descend, with `sense` -1) from a motion until no step changes the amplitude."""
     best = begin
     for _ in range(MOST_STEPS):
         further = _step(best, sense)
@@ -145,7 +148,7 @@ def _ascended(begin: TractionState, sense: float) -> TractionState:
 
 
 def _step(state: TractionState, sense: float) -> TractionState | None:
-    """Return a better motion, None if none is found."""
+    """Return a better motion; None without one."""
     problem: TractionProblem = state.problem
     room = state.room
     if not np.any(room.sticks & (room.half > 0.0)):
@@ -159,7 +162,7 @@ def _step(state: TractionState, sense: float) -> TractionState | None:
     end = state.farthest(slope)
     if np.sum(slope * (end - inner)) <= GAIN:
         return None
-    # what is aimed behind the end is dragged back to where the end then is; in the plane from far away it would come back elsewhere
+    # a slider beyond the end is dragged back to the new end; in the plane, from far away, it would end elsewhere
     planar = problem.starts.planar[:, None]
     far = np.where(planar, inner + PLANAR * (end - inner), room.middle + BEYOND * (end - room.middle))
     aim = np.where(slope != 0.0, far, inner)
