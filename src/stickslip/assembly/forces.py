@@ -344,7 +344,7 @@ def first_nodes(places: Places, outputs: tuple[Output, ...]) -> tuple[str, ...]:
 
 
 def far_outputs(places: Places, outputs: tuple[Output, ...]) -> list[str]:
-    """Return a warning about each output whose nearest node is far from the requested place."""
+    """Return a warning about each output whose nearest node is far from the requested position."""
     found = []
     for output in outputs:
         if output.near is None or output.on not in places.parts:

@@ -74,5 +74,5 @@ def compiled_step(step: Callable[..., None]) -> Any:
             f"is no step that numba compiles: {'; '.join(lines[1:5])}",
             "Use numbers, loops and arrays alone; 'A contact law' of docs/extending.md has the arguments.",
         ) from error
-    except RuntimeError:  # numba finds no place for the cache of code without a file
+    except RuntimeError:  # code without a file has no place for a cache
         return njit(STEP_SIGNATURE)(step)

@@ -53,7 +53,7 @@ _NODES_AT_ONCE = 16 * STAGES  # nodes whose products are evaluated in one BLAS c
 class Rows(NamedTuple):
     """Arrays for the derivatives of numbers by q = 3 m + 2 quantities."""
 
-    place: FloatArray  # (2, q) of the slider's place
+    place: FloatArray  # (2, q) of the slider's position
     angle: FloatArray  # (q,) of the angle of slip
     basis: FloatArray  # (2, m) cosines and sines at a time, and their derivatives
     stages: FloatArray  # (stages, q)
@@ -154,7 +154,7 @@ def _to_slip(motion, angle, tau, k, rows):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def to_stick(motion, angle, tau, k, slope, rows):  # type: ignore[no-untyped-def]
-    """Convert the row of the angle into the rows of the place."""
+    """Convert the row of the angle into the rows of the position."""
     m = motion.waves.shape[1]
     _, _, limit = place(motion, tau)
     limit = max(limit, 0.0)

@@ -52,7 +52,7 @@ class Course(NamedTuple):
 
     motion: Motion
     piece: Piece
-    state: FloatArray  # (4,) stick or slip, angle of the force, place of the slider
+    state: FloatArray  # (4,) stick or slip, angle of the force, position of the slider
     begun: FloatArray  # (4,) the state with which the period began
     # (2, 2) derivative of the position by the initial one; in slip, row 0 is the derivative of the angle
     memory: FloatArray
@@ -134,7 +134,7 @@ def _start_to_slip(course, tau):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def stop_slipping(course, tau):  # type: ignore[no-untyped-def]
-    """Change the state from slip to stick: the slider rests at its present place."""
+    """Change the state from slip to stick: the slider rests at its present position."""
     x, y, limit = place(course.motion, tau)
     state, memory = course.state, course.memory
     limit = max(limit, 0.0)
