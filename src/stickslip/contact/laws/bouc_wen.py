@@ -19,9 +19,9 @@ from stickslip.units import check_quantities, quantity
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoucWen:
-    """Smooth hysteresis ``T = alpha k x + (1 - alpha) k z`` (Wen 1976).
+    """Smooth hysteresis ``T = alpha k x + (1 - alpha) k z``, ``dz = (a - (beta sign(z dx) + gamma) |z|ⁿ) dx`` (Wen 1976).
 
-    Here ``dz = (a - (beta sign(z dx) + gamma) |z|ⁿ) dx``. The law is independent of the rate, and integrated exactly
+    The law is independent of the rate, and integrated exactly
     over each increment. It acts independently along t and w, with the same shape; along n it is a linear spring in
     tension and compression. The largest z is ``(a / (beta + gamma))^(1/n)``. A tangent counts as slipping where dz/dx
     is below half of a.
