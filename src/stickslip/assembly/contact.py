@@ -39,7 +39,7 @@ class Contact:
         Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: the normal of
         the surfaces.
     acts
-        Contact direction (t, w or n) of the relative motion of single dofs, which have no normal.
+        Direction of the relative motion of single dofs, which have no normal: ``tangential`` (along t) or ``normal``.
     tolerance
         Largest distance of partners, m: between nodes, or from a point to its segment; None: the default of the
         pairing.
