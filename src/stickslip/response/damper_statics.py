@@ -1,9 +1,10 @@
 """Static equilibrium of a rigid damper on its flanks: normal forces, T/N, and whether a flank can slip.
 
-Under its pull a damper is in equilibrium with many combinations of friction forces. A linear program gives the largest T/N of a flank among them: forces
-within the friction cones of all points balance the pull, and the friction along the flank is maximised. If this T/N is below the friction coefficient, the
-flank cannot slip, for any motion of the blades (C. Gastaldi, T. M. Berruti, International Journal of Non-Linear Mechanics 92 (2017) 25-40, section
-7: platform angles which do not allow the flat side to slip). The inertia of the damper is neglected.
+Under its pull a damper is in equilibrium with many combinations of friction forces. A linear program gives the largest
+T/N of a flank among them: forces within the friction cones of all points balance the pull, and the friction along the
+flank is maximised. If this T/N is below the friction coefficient, the flank cannot slip, for any motion of the blades
+(C. Gastaldi, T. M. Berruti, International Journal of Non-Linear Mechanics 92 (2017) 25-40, section 7: platform angles
+which do not allow the flat side to slip). The inertia of the damper is neglected.
 """
 
 from collections.abc import Callable
@@ -94,7 +95,8 @@ class FlankLimits:
     most
         Largest T/N in both senses along t, in static equilibrium.
     angle_deg
-        Inclination of the flank, degrees: 0 perpendicular to the pull, 90 along the pull; NaN for a flank that is no plane.
+        Inclination of the flank, degrees: 0 perpendicular to the pull, 90 along the pull; NaN for a flank that is no
+        plane.
     held_deg
         Ranges of this angle in which the flank cannot slip to and fro, with the other flanks unchanged.
     """

@@ -1,8 +1,9 @@
 """Modes in a frequency range: damping without friction, largest damping by friction, and the parts that move.
 
-Each contact law is replaced by its Coulomb limit. A slipping contact is a spring with the complex stiffness ``k η(x)``, with the same slip ratio x
-for all contacts: the gap amplitude over the amplitude at the onset of slip. From stuck (x = 1) to sliding (x large), each mode is tracked by its shape.
-The result is an estimate, no bound: for chains of masses with constant normal loads it was right within a factor of 1.5.
+Each contact law is replaced by its Coulomb limit. A slipping contact is a spring with the complex stiffness ``k η(x)``,
+with the same slip ratio x for all contacts: the gap amplitude over the amplitude at the onset of slip. From stuck (x =
+1) to sliding (x large), each mode is tracked by its shape. The result is an estimate, no bound: for chains of masses
+with constant normal loads it was right within a factor of 1.5.
 """
 
 from dataclasses import dataclass
@@ -63,8 +64,9 @@ class Friction:
 def friction_of(interface: Interface, static_gap: FloatArray, static_force: FloatArray) -> Friction:
     """Return the friction of contacts at static gaps (n_contacts, 3), m, under static forces (n_contacts, 3), N.
 
-    Each law is evaluated over a cycle of large amplitude in t and then in w, with its static normal gap. The dissipation is four times the
-    slip force times the amplitude. Springs without slip, and open contacts, have no limit.
+    Each law is evaluated over a cycle of large amplitude in t and then in w, with its static normal gap. The
+    dissipation is four times the slip force times the amplitude. Springs without slip, and open contacts, have no
+    limit.
     """
     n = interface.n_contacts
     compiled = interface.compiled()

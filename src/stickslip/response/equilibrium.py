@@ -90,8 +90,8 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
 def frozen_sliders(system: System, static_load: FloatArray, friction_share: float = 1.0) -> System:
     """Return the system with all sliders at their positions in the static equilibrium.
 
-    Without slip and lift-off, a vibration is then linear about the static state, and the static part is independent of the harmonics
-    (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off loses its initial position.
+    Without slip and lift-off, a vibration is then linear about the static state, and the static part is independent of
+    the harmonics (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off loses its initial position.
 
     Parameters
     ----------
@@ -100,8 +100,9 @@ def frozen_sliders(system: System, static_load: FloatArray, friction_share: floa
     static_load
         (n,) static forces on all dofs, N.
     friction_share
-        Factor on the friction coefficients in the static solution, above 0 to 1: contacts carry at most this share of ``mu N`` at
-        rest. With 1, a contact that slips under the static load is at its friction limit, and any vibration moves its slider.
+        Factor on the friction coefficients in the static solution, above 0 to 1: contacts carry at most this share of
+        ``mu N`` at rest. With 1, a contact that slips under the static load is at its friction limit, and any vibration
+        moves its slider.
 
     Returns
     -------
@@ -141,7 +142,8 @@ def _unstretched(law: ContactLaw) -> ContactLaw:
 def _released(balance: HarmonicBalance, options: Newton) -> Solution:
     """Solve with a spring on every coordinate, and remove the springs by continuation.
 
-    A wedged damper that rolls onto its seat passes states from which Newton's method fails, with all contacts slipping and some open.
+    A wedged damper that rolls onto its seat passes states from which Newton's method fails, with all contacts slipping
+    and some open.
     """
     held = _Held(balance)
     following = Following(newton=options, control=HOLDING, weights=np.ones(balance.size))

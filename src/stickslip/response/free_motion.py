@@ -1,7 +1,8 @@
 """Detection of free dampers with an undetermined mean position.
 
-A contact that slips or opens in every cycle forgets its mean position. If all contacts of a free damper do, its coordinates without a
-normal spring may drift: the Jacobian is singular, and the static part of the solution along them is meaningless.
+A contact that slips or opens in every cycle forgets its mean position. If all contacts of a free damper do, its
+coordinates without a normal spring may drift: the Jacobian is singular, and the static part of the solution along them
+is meaningless.
 """
 
 from collections.abc import Callable

@@ -38,7 +38,8 @@ class Discretisation:
     samples
         Samples per period of the contact forces.
     evaluator
-        Evaluation of piecewise-linear laws; ``events`` has no sampling error, so that amplitudes are smooth in every parameter.
+        Evaluation of piecewise-linear laws; ``events`` has no sampling error, so that amplitudes are smooth in every
+        parameter.
     newton
         Corrector options.
 
@@ -132,9 +133,10 @@ def branch_in_parameter(
     load
         Static and harmonic forces on all dofs, N.
     parameter
-        ``excitation`` or ``static_load``: a factor on the harmonic or static forces. A field of the contact laws (``mu``, ``preload``,
-        ``limit``, ``k_t``, ``k_n``, ``initial_gap`` and so on): its value for all contacts that have it. A function ``value -> (system,
-        load)`` varies anything else. For the frequency itself see `forced_response`.
+        ``excitation`` or ``static_load``: a factor on the harmonic or static forces. A field of the contact laws
+        (``mu``, ``preload``, ``limit``, ``k_t``, ``k_n``, ``initial_gap`` and so on): its value for all contacts that
+        have it. A function ``value -> (system, load)`` varies anything else. For the frequency itself see
+        `forced_response`.
     span
         First and last value of the parameter; the last may be the smaller one.
     omega
@@ -147,8 +149,8 @@ def branch_in_parameter(
     Yields
     ------
     ParameterPoint
-        Points in the order of the branch, the last one at the end of the span. Where the branch is lost, a point without convergence
-        follows, and a restart a little further on.
+        Points in the order of the branch, the last one at the end of the span. Where the branch is lost, a point
+        without convergence follows, and a restart a little further on.
 
     Raises
     ------

@@ -1,10 +1,11 @@
 """Sensitivity of a resonance peak to the contact model: to the contact stiffness, and to the number of contact points.
 
-A solution of ``R(x, ω, κ) = 0``, with the logarithm κ of a factor on all contact stiffnesses, changes by ``dx/dκ = -J⁻¹ ∂R/∂κ``. Only the contact
-forces depend on κ; their derivative is a finite difference at the same motion. At a peak ``∂A/∂ω = 0``, so that by the envelope theorem the peak
-amplitude has the same derivative as the amplitude at a fixed frequency. Solved points lie near the peak, not on it. Two of them with slightly different
-frequencies give the derivatives of ``∂A/∂ω`` and ``∂A/∂κ`` by the frequency, and from these the peak frequency, its derivative ``dω/dκ = -A_κω / A_ωω``
-and ``∂A/∂κ`` at the peak.
+A solution of ``R(x, ω, κ) = 0``, with the logarithm κ of a factor on all contact stiffnesses, changes by ``dx/dκ = -J⁻¹
+∂R/∂κ``. Only the contact forces depend on κ; their derivative is a finite difference at the same motion. At a peak
+``∂A/∂ω = 0``, so that by the envelope theorem the peak amplitude has the same derivative as the amplitude at a fixed
+frequency. Solved points lie near the peak, not on it. Two of them with slightly different frequencies give the
+derivatives of ``∂A/∂ω`` and ``∂A/∂κ`` by the frequency, and from these the peak frequency, its derivative ``dω/dκ =
+-A_κω / A_ωω`` and ``∂A/∂κ`` at the peak.
 
 With half as many contact points, each point represents two neighbours and their mean gap.
 """

@@ -54,8 +54,8 @@ class Signals:
 def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
     """Recover outputs, gaps, forces and dissipated energy at a point.
 
-    The energy is the work of the tangential forces over the period, exact for the kept harmonics: ``E = π Σ_h h Im(conj(G_h) Λ_h)``. The normal
-    spring is conservative and does not contribute.
+    The energy is the work of the tangential forces over the period, exact for the kept harmonics: ``E = π Σ_h h
+    Im(conj(G_h) Λ_h)``. The normal spring is conservative and does not contribute.
     """
     linear, interface = problem.low.linear, problem.low.interface
     outputs = linear.recover(point.omega, point.coefficients)[:, problem.system.outputs]
@@ -72,8 +72,9 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
 def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
     """Return the damping ratio of a linear oscillator with the same loss factor: at a peak, half the inverse of the quality factor.
 
-    ``ζ = W / (4π U)``, where W is the work of the harmonic loads in a cycle, which equals the total dissipation of a steady motion, and U the
-    largest vibration energy in structure and contacts, twice its mean. NaN without a vibration.
+    ``ζ = W / (4π U)``, where W is the work of the harmonic loads in a cycle, which equals the total dissipation of a
+    steady motion, and U the largest vibration energy in structure and contacts, twice its mean. NaN without a
+    vibration.
     """
     work, _, stored = _work_and_energy(problem, point)
     return work / (4.0 * np.pi * stored) if stored > 0.0 else float("nan")
@@ -82,8 +83,8 @@ def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
 def damped_share(problem: ForcedProblem, point: ForcedPoint, ratio: float) -> float:
     """Return the dissipation of a damping `ratio` in a cycle over the largest work of the loads at any phase.
 
-    Far below 1, the loads balance stiffness and inertia; damping shifts the phase of the motion by this angle, rad, but does not change its
-    amplitude. Near 1 or above, damping determines the amplitude. NaN if the loads do no work.
+    Far below 1, the loads balance stiffness and inertia; damping shifts the phase of the motion by this angle, rad, but
+    does not change its amplitude. Near 1 or above, damping determines the amplitude. NaN if the loads do no work.
     """
     _, most, stored = _work_and_energy(problem, point)
     return 4.0 * np.pi * ratio * stored / most if most > 0.0 else float("nan")

@@ -61,12 +61,14 @@ def rigid_response(
 ) -> Iterator[RigidPoint]:
     """Compute the forced response of a system with `RigidCoulomb` contacts over a frequency range, by arc length.
 
-    All harmonics are kept everywhere. There is no Jacobian Alert, because the force of a rigid contact is no function of its gap.
+    All harmonics are kept everywhere. There is no Jacobian Alert, because the force of a rigid contact is no function
+    of its gap.
 
     Parameters
     ----------
     system
-        Structure, contacts and outputs. Each gap of a rigid contact must be a coordinate: see `in_relative_coordinates`.
+        Structure, contacts and outputs. Each gap of a rigid contact must be a coordinate: see
+        `in_relative_coordinates`.
     load
         Static and harmonic forces on all dofs, N.
     omega_range
@@ -74,16 +76,16 @@ def rigid_response(
     points
         Smallest number of points; curved parts of the branch get more.
     discretisation
-        Harmonics, samples, solver. With as many samples as coefficients, ``2 order + 1``, the laws hold exactly at the samples; eight or more
-        samples for each harmonic are more accurate.
+        Harmonics, samples, solver. With as many samples as coefficients, ``2 order + 1``, the laws hold exactly at the
+        samples; eight or more samples for each harmonic are more accurate.
     penalty
         Penalty of the method, N/m; see `dynamic_lagrangian`. It is no stiffness of the contacts.
 
     Yields
     ------
     RigidPoint
-        Points in the order of the branch, the last one at the end of the range. Where the branch is lost, a point without convergence
-        follows, and a restart a little further on.
+        Points in the order of the branch, the last one at the end of the range. Where the branch is lost, a point
+        without convergence follows, and a restart a little further on.
 
     Raises
     ------

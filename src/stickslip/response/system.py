@@ -26,7 +26,8 @@ class System:
     Parameters
     ----------
     structure
-        Linear structure: reduced blades and dampers, one sector of a tuned wheel, or `Unreduced` for thousands of contacts.
+        Linear structure: reduced blades and dampers, one sector of a tuned wheel, or `Unreduced` for thousands of
+        contacts.
     interface
         Contacts on the structure's dofs.
     outputs
@@ -36,7 +37,8 @@ class System:
     free
         Dofs of rigid bodies held by contacts only; they are retained with or without a contact.
     peak_of
-        Positions of the outputs whose largest amplitude defines the response, such as all blades; None: the first output.
+        Positions of the outputs whose largest amplitude defines the response, such as all blades; None: the first
+        output.
     """
 
     structure: LinearSide
@@ -109,8 +111,8 @@ class System:
     def with_retention(self, stiffness: float) -> "System":
         """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
 
-        Rotational dofs get the stiffness times the inertia tensor over the mass of the body, so that one number serves all six dofs in any
-        orientation of the body.
+        Rotational dofs get the stiffness times the inertia tensor over the mass of the body, so that one number serves
+        all six dofs in any orientation of the body.
         """
         if self.free is None or stiffness == 0.0:
             return self

@@ -67,17 +67,19 @@ class SupportCheck:
 def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor: int = 2) -> tuple[SupportCheck, ...]:
     """Predict the change of every solved point by all harmonics up to a multiple of the reference order, and by its judging set.
 
-    Each point takes two Newton steps: two contact evaluations and two linear solutions. The first step keeps the contact states of the point;
-    the second uses the states after the first. If the two predictions differ by more than 2 %, the motion is solved with these harmonics (up to
-    `MAX_ROWS`). If this fails, the second prediction serves as a warning, which is usually too large and is no bound. Harmonics that the
-    reference omits, such as even ones, are part of the comparison.
+    Each point takes two Newton steps: two contact evaluations and two linear solutions. The first step keeps the
+    contact states of the point; the second uses the states after the first. If the two predictions differ by more than
+    2 %, the motion is solved with these harmonics (up to `MAX_ROWS`). If this fails, the second prediction serves as a
+    warning, which is usually too large and is no bound. Harmonics that the reference omits, such as even ones, are part
+    of the comparison.
 
     Parameters
     ----------
     problem
         The forced response (`forced_problem`).
     points
-        Points of the response (`accepted_points`) with the reference harmonics or fewer; points that did not converge are skipped.
+        Points of the response (`accepted_points`) with the reference harmonics or fewer; points that did not converge
+        are skipped.
     factor
         Highest harmonic of the check over the highest of the reference, at least 2.
 
@@ -218,9 +220,9 @@ class HarmonicContributions:
     labels
         k names of the dofs.
     parts
-        (k, n_missing) relative change of the output by each missing harmonic: to first order, the real part is the relative change of the
-        amplitude, and the imaginary part the change of the phase, rad. The sum over a row is the estimated change. Infinite if the
-        Jacobian is singular.
+        (k, n_missing) relative change of the output by each missing harmonic: to first order, the real part is the
+        relative change of the amplitude, and the imaginary part the change of the phase, rad. The sum over a row is the
+        estimated change. Infinite if the Jacobian is singular.
     bound
         Largest expected relative change of any output, at least the prediction of the Jacobian Alert.
     """
@@ -238,8 +240,8 @@ class HarmonicContributions:
 def harmonic_contributions(problem: ForcedProblem, point: ForcedPoint, goal: Goal = "motion") -> HarmonicContributions:
     """Estimate the change of the outputs at a solved point by each missing harmonic of the reference.
 
-    The residuals of the missing harmonics are weighted by the adjoints of the outputs (Becker & Rannacher 2001, section 2), with the mean
-    Jacobian of two or three evaluations with all harmonics and without iteration.
+    The residuals of the missing harmonics are weighted by the adjoints of the outputs (Becker & Rannacher 2001, section
+    2), with the mean Jacobian of two or three evaluations with all harmonics and without iteration.
 
     Parameters
     ----------

@@ -30,9 +30,9 @@ class Basins:
     omega
         Frequency of the load, rad/s.
     ends
-        (starts,) number of the motion at this frequency on which each start ends. `APERIODIC`: the motion does not repeat with the
-        period of the load, or not within the allowed periods; `PERIODIC`: it repeats, but no solution was found for it; `DIVERGED`: it
-        grows without bound.
+        (starts,) number of the motion at this frequency on which each start ends. `APERIODIC`: the motion does not
+        repeat with the period of the load, or not within the allowed periods; `PERIODIC`: it repeats, but no solution
+        was found for it; `DIVERGED`: it grows without bound.
     """
 
     omega: float
@@ -72,7 +72,8 @@ class StartSampler:
     mean
         (n,) mean displacement of all random states, m.
     shapes, omegas, radius
-        (n, modes) mass-normalised modes with stuck contacts, (modes,) their frequencies in rad/s, and (modes,) their largest amplitudes.
+        (n, modes) mass-normalised modes with stuck contacts, (modes,) their frequencies in rad/s, and (modes,) their
+        largest amplitudes.
     """
 
     problem: ForcedProblem

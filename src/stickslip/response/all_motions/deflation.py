@@ -65,8 +65,9 @@ def deflated_newton(
 ) -> Solution:
     """Solve ``residual(x) = 0`` for a solution other than the known ones.
 
-    The residual r becomes ``m r`` with ``m = Π (1/d_i² + 1)`` and the distances d_i from the known solutions. It has no zero at a known solution
-    and equals r far away. Its Jacobian is ``m J + r ∇mᵀ``. The solution is then solved once more without m.
+    The residual r becomes ``m r`` with ``m = Π (1/d_i² + 1)`` and the distances d_i from the known solutions. It has no
+    zero at a known solution and equals r far away. Its Jacobian is ``m J + r ∇mᵀ``. The solution is then solved once
+    more without m.
 
     Parameters
     ----------

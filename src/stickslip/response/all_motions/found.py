@@ -22,8 +22,8 @@ class Stage:
     Attributes
     ----------
     kind
-        ``branch``: points of a branch; ``searched``: deflation at a frequency is finished; ``starts``: the starts in time at a frequency
-        are finished; ``motions``: the distinct motions at a frequency.
+        ``branch``: points of a branch; ``searched``: deflation at a frequency is finished; ``starts``: the starts in
+        time at a frequency are finished; ``motions``: the distinct motions at a frequency.
     place
         Number of the frequency; -1 for the sweep.
     origin
@@ -33,13 +33,16 @@ class Stage:
     omega
         (k,) basic frequencies of the motions along the branch, or of motions or starts, rad/s.
     coefficients
-        (k, H+1, n_retained) amplitudes of the retained coordinates, m; for starts at their end, NaN if the motion does not repeat.
+        (k, H+1, n_retained) amplitudes of the retained coordinates, m; for starts at their end, NaN if the motion does
+        not repeat.
     branch
-        (k,) for motions the number of their branch; for starts the number of their motion or a code of `Basins`; otherwise empty.
+        (k,) for motions the number of their branch; for starts the number of their motion or a code of `Basins`;
+        otherwise empty.
     multiplier, error
         (k,) for motions: modulus of the deciding multiplier and its error; NaN if not examined.
     change
-        (k,) for motions: predicted change by more harmonics, relative to the vibration; infinite without a nearby motion.
+        (k,) for motions: predicted change by more harmonics, relative to the vibration; infinite without a nearby
+        motion.
     words
         Stability of the motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
     tries
@@ -74,8 +77,8 @@ class MotionBranch:
     end
         Reason for its end, in words.
     omega, amplitude
-        (points,) frequency, rad/s, and amplitude of the first output, m, over the driven harmonics; for motions of several periods over
-        all harmonics.
+        (points,) frequency, rad/s, and amplitude of the first output, m, over the driven harmonics; for motions of
+        several periods over all harmonics.
     coefficients
         (points, H+1, n_retained) amplitudes of the retained coordinates, m.
     """
@@ -147,7 +150,8 @@ class MotionAt:
     multiplier, error
         Modulus of the deciding multiplier, and its error.
     change
-        Predicted change of the motion by more harmonics, relative to its vibration; infinite without a nearby motion, NaN if not examined.
+        Predicted change of the motion by more harmonics, relative to its vibration; infinite without a nearby motion,
+        NaN if not examined.
     """
 
     branch: int

@@ -29,8 +29,9 @@ def mode_starts(
 ) -> list[FloatArray]:
     """Return starts for motions at an internal or subharmonic resonance, by ascending residual.
 
-    Without damping and load, a mode with stuck or open contacts vibrates freely in one harmonic at amplitudes where the force along its
-    shape vanishes. A motion on an isolated branch lies near such a free motion plus the known motion, at some phase.
+    Without damping and load, a mode with stuck or open contacts vibrates freely in one harmonic at amplitudes where the
+    force along its shape vanishes. A motion on an isolated branch lies near such a free motion plus the known motion,
+    at some phase.
 
     Parameters
     ----------

@@ -26,8 +26,9 @@ class Bifurcation:
     Parameters
     ----------
     kind
-        ``fold``, ``period doubling`` (crossing at -1), ``Neimark-Sacker`` (crossing at an angle), ``branch point`` (crossing at 1 without a
-        fold: a branch of less symmetry crosses), or ``jump of multipliers`` (across the circle, by a change of a contact state).
+        ``fold``, ``period doubling`` (crossing at -1), ``Neimark-Sacker`` (crossing at an angle), ``branch point``
+        (crossing at 1 without a fold: a branch of less symmetry crosses), or ``jump of multipliers`` (across the
+        circle, by a change of a contact state).
     point
         Solution at the bifurcation, with the harmonics of the branch.
     amplitude
@@ -37,14 +38,15 @@ class Bifurcation:
     multiplier_error
         Error bound of the multiplier against the motion with all harmonics.
     omega_error
-        Error bound of the frequency, rad/s, from the bracket and from the error of the multiplier; at a fold, the difference to the same
-        fold with more harmonics.
+        Error bound of the frequency, rad/s, from the bracket and from the error of the multiplier; at a fold, the
+        difference to the same fold with more harmonics.
     before, after
         Number of multipliers outside the unit circle on either side.
     place
         Positions of the two neighbouring points.
     certain
-        Whether the crossing multiplier, with its error, lies on one side of the circle at both points. A fold is certain.
+        Whether the crossing multiplier, with its error, lies on one side of the circle at both points. A fold is
+        certain.
     """
 
     kind: BifurcationKind
@@ -109,7 +111,8 @@ class Bifurcations:
     stabilities
         Stability of each point of the branch; None where it was not computed or is unknown.
     stride
-        Distance of examined points. Points between two of them are examined where the numbers of multipliers outside the circle differ.
+        Distance of examined points. Points between two of them are examined where the numbers of multipliers outside
+        the circle differ.
     """
 
     found: tuple[Bifurcation, ...]

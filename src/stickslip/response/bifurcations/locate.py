@@ -55,23 +55,26 @@ def bifurcations(
 ) -> Bifurcations:
     """Locate the bifurcations along a branch of a forced response.
 
-    Folds are found where the tangent of the branch turns back. Other bifurcations lie between two points with different numbers of
-    multipliers outside the unit circle. The branch is solved on planes across the chord until the crossing modulus is 1 (Brent's
-    method), or until the two sides of a jump are within the tolerance. Multipliers that leave the circle and return within one step are missed.
+    Folds are found where the tangent of the branch turns back. Other bifurcations lie between two points with different
+    numbers of multipliers outside the unit circle. The branch is solved on planes across the chord until the crossing
+    modulus is 1 (Brent's method), or until the two sides of a jump are within the tolerance. Multipliers that leave the
+    circle and return within one step are missed.
 
     Parameters
     ----------
     problem
         The forced response of the points.
     points
-        Points in the order of the branch, without peak points at its end. Points that did not converge interrupt the branch.
+        Points in the order of the branch, without peak points at its end. Points that did not converge interrupt the
+        branch.
     examine
         Function that returns the multipliers of a solution; None: folds only.
     tolerance
         Tolerance of the location, a length along the branch, see `StepControl`.
     most
-        Largest number of motions whose multipliers are computed. If the branch has more than two thirds as many points, only every
-        second, third, ... point is examined, and points between where the numbers of multipliers outside the circle differ.
+        Largest number of motions whose multipliers are computed. If the branch has more than two thirds as many points,
+        only every second, third, ... point is examined, and points between where the numbers of multipliers outside the
+        circle differ.
 
     Raises
     ------

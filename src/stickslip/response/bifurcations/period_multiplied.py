@@ -17,8 +17,8 @@ from stickslip.response.time.sectors import SectorsInTime, all_sectors
 def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProblem:
     """Return the forced response whose period is `periods` periods of the load.
 
-    Its frequency is ω / `periods`. Harmonic h of the load is its harmonic `periods` · h; the harmonics between are subharmonic. Sweep, points
-    and amplitudes refer to the lower frequency.
+    Its frequency is ω / `periods`. Harmonic h of the load is its harmonic `periods` · h; the harmonics between are
+    subharmonic. Sweep, points and amplitudes refer to the lower frequency.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProb
     periods
         Number of periods, 2 for a doubled period.
     order
-        Highest harmonic of the load's frequency. All harmonics of the lower frequency up to `periods` times this one are kept.
+        Highest harmonic of the load's frequency. All harmonics of the lower frequency up to `periods` times this one
+        are kept.
 
     Raises
     ------

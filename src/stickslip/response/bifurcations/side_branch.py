@@ -125,9 +125,9 @@ class SideBranch:
 def side_branches(problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS) -> list[SideBranch]:
     """Follow the branches that leave a forced response at a bifurcation.
 
-    At a period doubling the motion covers two periods of the load. At a branch point of a tuned wheel every sector may move
-    differently. Branches leave along the null directions of the Jacobian. They are followed by arc length, with fixed harmonics, until they
-    return, leave the frequency range, or reach the largest number of points.
+    At a period doubling the motion covers two periods of the load. At a branch point of a tuned wheel every sector may
+    move differently. Branches leave along the null directions of the Jacobian. They are followed by arc length, with
+    fixed harmonics, until they return, leave the frequency range, or reach the largest number of points.
 
     Parameters
     ----------
@@ -187,7 +187,8 @@ def subharmonic_branch(
     periods
         Periods of the load in one period of the motion: 3 for a motion of ω/3.
     start
-        (H+1, n_retained) coefficients of a motion near the branch, m, in harmonics of ω / `periods`, from a time integration or a guess.
+        (H+1, n_retained) coefficients of a motion near the branch, m, in harmonics of ω / `periods`, from a time
+        integration or a guess.
     points
         Largest number of points.
 
@@ -387,8 +388,8 @@ def _point(balance: Balance, point: Point) -> ForcedPoint:
 def open_directions(balance: HarmonicBalance, point: Point, following: Following, count: int) -> FloatArray:
     """Return the (count, n + 1) directions of crossing branches: approximate null vectors of the Jacobian.
 
-    They are the singular vectors of the smallest singular values of the Jacobian with the branch's tangent as an additional row, by inverse
-    iteration.
+    They are the singular vectors of the smallest singular values of the Jacobian with the branch's tangent as an
+    additional row, by inverse iteration.
     """
     at = balance.linearise(point.x, point.p)
     jac = at.dense_jac()
@@ -411,9 +412,10 @@ def open_directions(balance: HarmonicBalance, point: Point, following: Following
 def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray | None) -> list[FloatArray]:
     """Return the directions to search for branches: each one with both signs, and combinations of several.
 
-    Where a wheel loses its symmetry by forward and backward waves at once, there are two directions, and every combination solves the
-    linear equations. Branches have combinations that are symmetric about a sector or about the middle between two: with the largest motion
-    of the first sector (without a wheel, of the first coordinate), with the smallest, and their sum.
+    Where a wheel loses its symmetry by forward and backward waves at once, there are two directions, and every
+    combination solves the linear equations. Branches have combinations that are symmetric about a sector or about the
+    middle between two: with the largest motion of the first sector (without a wheel, of the first coordinate), with the
+    smallest, and their sum.
     """
     found = list(directions)
     if len(directions) > 1:

@@ -1,17 +1,21 @@
 """Continuation of periodic motions with adaptive harmonics: start, predict, correct, judge, adapt, recover.
 
-A branch is followed by arc length, or from one listed value of the parameter to the next. Each point is solved on one of a few *levels*: the
-same equation with increasing harmonics (with one level, harmonics are fixed). A point is *quiet* if its estimated error is below the threshold.
-The level changes along the branch:
+A branch is followed by arc length, or from one listed value of the parameter to the next. Each point is solved on one
+of a few *levels*: the same equation with increasing harmonics (with one level, harmonics are fixed). A point is *quiet*
+if its estimated error is below the threshold. The level changes along the branch:
 
-- A point that is not quiet is solved on the next level. If both solutions agree, the point is kept. Otherwise the previous point, which was quiet,
-  is solved on the next level, too, and the branch continues from there: where both levels agree, the branch stays on the same sheet.
-- Such second solutions are *audits*. Further audits are made at every tenth point and near each maximum, unless the level is the last one or no force
-  acts on the neglected harmonics. After a failed audit, the branch goes back to the last point that passed, and continues from there with more harmonics.
-- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the number of points until the next one.
+- A point that is not quiet is solved on the next level. If both solutions agree, the point is kept. Otherwise the
+  previous point, which was quiet, is solved on the next level, too, and the branch continues from there: where both
+  levels agree, the branch stays on the same sheet.
+- Such second solutions are *audits*. Further audits are made at every tenth point and near each maximum, unless the
+  level is the last one or no force acts on the neglected harmonics. After a failed audit, the branch goes back to the
+  last point that passed, and continues from there with more harmonics.
+- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the number of points until the next
+  one.
 
-A branch that is lost, or that makes no progress in the parameter for long, is restarted a little further on. A branch that runs back beside itself
-without new information is deleted and restarted, too. Failed values are tried once more when their neighbours are known.
+A branch that is lost, or that makes no progress in the parameter for long, is restarted a little further on. A branch
+that runs back beside itself without new information is deleted and restarted, too. Failed values are tried once more
+when their neighbours are known.
 """
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -59,7 +63,8 @@ def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterato
     route
         Range and steps of the parameter.
     done
-        Results of an interrupted run, in their order. They are not computed again, and the remaining results are the same.
+        Results of an interrupted run, in their order. They are not computed again, and the remaining results are the
+        same.
 
     Yields
     ------
@@ -176,7 +181,8 @@ class _Walk:
     def _levels(self) -> int:
         """Return the number of allowed levels by the budgets of the present stretch and of all stretches together.
 
-        Each stretch has its own budget, so that a hard one leaves enough for later ones; all together have `STRETCHES` times as much.
+        Each stretch has its own budget, so that a hard one leaves enough for later ones; all together have `STRETCHES`
+        times as much.
         """
         points = len(self.branch) + self.forgotten + 1
         own = levels_left(self.curve, self.route, max(points - self.before, 1), self.spent - self.spent_before)

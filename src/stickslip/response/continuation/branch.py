@@ -45,9 +45,10 @@ class Followed:
     Attributes
     ----------
     kind
-        ``point``: a point of the branch, which replaces all points with its index or a higher one. ``audit``: the same motion with more
-        harmonics, for comparison. ``trial``: the same motion with fewer harmonics, from which the branch continues. ``found``: replaces
-        the failed point of its index only. ``between``: follows the point of its index, added after the end of the branch.
+        ``point``: a point of the branch, which replaces all points with its index or a higher one. ``audit``: the same
+        motion with more harmonics, for comparison. ``trial``: the same motion with fewer harmonics, from which the
+        branch continues. ``found``: replaces the failed point of its index only. ``between``: follows the point of its
+        index, added after the end of the branch.
     index
         Position along the branch.
     level
@@ -161,8 +162,8 @@ class OneLevel(Curve):
     way
         Continuation options.
     begin
-        Function that solves at a value that no branch reached, from nearby states. Its last argument is the effort, as in
-        `stickslip.response.continuation.starting_solutions.without_branch`.
+        Function that solves at a value that no branch reached, from nearby states. Its last argument is the effort, as
+        in `stickslip.response.continuation.starting_solutions.without_branch`.
     """
 
     equation: Problem
@@ -195,7 +196,8 @@ class Route:
     listed
         Values to step through, in their order; empty: continuation by arc length.
     leaves
-        Whether to leave a branch that leads back or makes no progress, and restart further on. Otherwise it is followed to its end.
+        Whether to leave a branch that leads back or makes no progress, and restart further on. Otherwise it is followed
+        to its end.
     """
 
     first: float
@@ -232,8 +234,8 @@ class Route:
     def idle(self, values: Sequence[float]) -> bool:
         """Whether a branch left the range backwards, or advanced less than a step in its last points.
 
-        Stiff contacts that lift off under little damping may fold a branch hundreds of times within a step. It is then left, as a machine
-        would leave it.
+        Stiff contacts that lift off under little damping may fold a branch hundreds of times within a step. It is then
+        left, as a machine would leave it.
         """
         if self.listed or not self.leaves:
             return False

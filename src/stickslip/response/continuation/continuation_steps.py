@@ -139,7 +139,8 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
 def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -> int:
     """Return the number of points at the end of a branch that run back beside it over a step length: all points after the turn, or 0.
 
-    Contacts that lift off many times in a period may cause such a fold on the last level; more harmonics would remove it.
+    Contacts that lift off many times in a period may cause such a fold on the last level; more harmonics would remove
+    it.
     """
     count = 0
     for before, after in pairwise(reversed(branch)):  # the last point first

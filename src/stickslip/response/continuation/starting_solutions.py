@@ -56,7 +56,8 @@ def without_branch(
     near
         (size,) unknowns of nearby motions.
     effort
-        Share of the Newton steps of `steps_at_most` for all attempts, including homotopies and other globalisations; 0: Newton's method only.
+        Share of the Newton steps of `steps_at_most` for all attempts, including homotopies and other globalisations; 0:
+        Newton's method only.
     """
     starts = _starts(system, balance, options, omega, near)
     if effort:
@@ -204,11 +205,12 @@ def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
 def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
     """Yield homotopies from a linear problem to the balance at one frequency.
 
-    First the excitation grows from almost zero, where no contact changes its state and the problem is linear. Damping bounds the
-    motion under every share of the excitation. The path therefore reaches the full excitation, through folds if necessary (degree
-    theory; Allgower & Georg 1990). During this homotopy contacts act on harmonics up to the highest driven one only: each further
-    harmonic adds folds, and with all of them the path takes ten times as many steps. Then the contact forces of the higher harmonics
-    join. Where several motions coexist, the result may differ from the motions at neighbouring frequencies.
+    First the excitation grows from almost zero, where no contact changes its state and the problem is linear. Damping
+    bounds the motion under every share of the excitation. The path therefore reaches the full excitation, through folds
+    if necessary (degree theory; Allgower & Georg 1990). During this homotopy contacts act on harmonics up to the
+    highest driven one only: each further harmonic adds folds, and with all of them the path takes ten times as many
+    steps. Then the contact forces of the higher harmonics join. Where several motions coexist, the result may differ
+    from the motions at neighbouring frequencies.
 
     Parameters
     ----------

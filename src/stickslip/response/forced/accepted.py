@@ -15,9 +15,9 @@ AUDITS: tuple[Stage, ...] = ("audit", "check", "compared")
 def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
     """Return the points of the response, each with the low-order point that it repeats.
 
-    They are in the order of the branch: points of the first passage, replaced by their repeats. Where some repeats of a run failed, the
-    branch with many harmonics replaces the run, if it reached the other side. Time integration fills remaining gaps. Peak points come
-    last.
+    They are in the order of the branch: points of the first passage, replaced by their repeats. Where some repeats of a
+    run failed, the branch with many harmonics replaces the run, if it reached the other side. Time integration fills
+    remaining gaps. Peak points come last.
     """
     pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
     if any(p.stage == "point" for p in points):
@@ -107,8 +107,9 @@ def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
 def replaced(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> int:
     """Return the index of the last point of the first passage that a branch replaces; -1 if it replaces none.
 
-    A branch replaces its run if it reaches the frequency and the motion of the next point without an alert. A folded branch may pass
-    that frequency on another sheet. It then continues to the end of the range and replaces all points that follow.
+    A branch replaces its run if it reaches the frequency and the motion of the next point without an alert. A folded
+    branch may pass that frequency on another sheet. It then continues to the end of the range and replaces all points
+    that follow.
     """
     if not branch or not branch[-1].converged:
         return -1

@@ -24,8 +24,8 @@ def amplitudes(motion: ComplexArray, driven: Harmonics, of: AmplitudeOf) -> Floa
     driven
         Harmonics that the load drives.
     of
-        ``first``: amplitude of the driven harmonic, or the norm of several. ``half_peak_to_peak``: half the distance from the smallest to
-        the largest displacement in a period. ``rms``: root mean square about the mean.
+        ``first``: amplitude of the driven harmonic, or the norm of several. ``half_peak_to_peak``: half the distance
+        from the smallest to the largest displacement in a period. ``rms``: root mean square about the mean.
     """
     if of == "first":
         rows = [h for h in driven if h < len(motion)]

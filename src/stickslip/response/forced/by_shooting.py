@@ -44,7 +44,8 @@ def shooting_response(
     stepping
         Steps in a period, tolerance, largest number of periods.
     done
-        Points of an interrupted run, in their order. They are not computed again, and the remaining points are the same.
+        Points of an interrupted run, in their order. They are not computed again, and the remaining points are the
+        same.
 
     Yields
     ------

@@ -88,8 +88,9 @@ def found_in_time(
 ) -> Iterator[ForcedPoint]:
     """Yield results of time integration at the failed frequencies that are not in `done`.
 
-    A motion that repeats starts Newton's method. Structures with `MOST_COORDINATES` or more coordinates, rigid contacts, and structures
-    without equations in time (tuned wheels, structural damping, coordinates without mass) are skipped.
+    A motion that repeats starts Newton's method. Structures with `MOST_COORDINATES` or more coordinates, rigid
+    contacts, and structures without equations in time (tuned wheels, structural damping, coordinates without mass) are
+    skipped.
 
     Parameters
     ----------
@@ -167,8 +168,8 @@ def _orders(problem: ForcedProblem, lost: ForcedPoint) -> list[int]:
 def _solved(problem: ForcedProblem, lost: ForcedPoint, seen: Repetition) -> list[tuple[Balance, Solution]]:
     """Return Newton attempts from the motion in time, of which the last counts.
 
-    Close to the solution the natural-level Newton method continues where the residual stalls. A motion that settles too slowly for a
-    verdict is tried with the requested harmonics only.
+    Close to the solution the natural-level Newton method continues where the residual stalls. A motion that settles too
+    slowly for a verdict is tried with the requested harmonics only.
     """
     if seen.verdict == "not periodic" or not seen.finite:
         return []

@@ -150,8 +150,8 @@ def _from_rest(
     Returns
     -------
     tuple
-        Unknowns for the harmonics of the last period, None if the motion overflows or has no initial state; and the number of integrated
-        periods.
+        Unknowns for the harmonics of the last period, None if the motion overflows or has no initial state; and the
+        number of integrated periods.
     """
     system, linear = problem.system.at(omega), balance.linear
     interface = system.interface

@@ -1,7 +1,7 @@
 """Passages of the Jacobian Alert (Gastaldi & Berruti 2017, section 4.4).
 
-The double passage computes a branch with few harmonics, then repeats the frequencies that need more. The single passage settles each frequency
-before the next.
+The double passage computes a branch with few harmonics, then repeats the frequencies that need more. The single passage
+settles each frequency before the next.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,8 +46,8 @@ def double_passage(
 ) -> Iterator[ForcedPoint]:
     """Compute the response with few harmonics, then repeat the points that need more.
 
-    A run of neighbouring repeats is solved forward, and failed repeats once more backward. Points that still fail are sought along the
-    branch with many harmonics, which may replace the run, then by homotopies.
+    A run of neighbouring repeats is solved forward, and failed repeats once more backward. Points that still fail are
+    sought along the branch with many harmonics, which may replace the run, then by homotopies.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def double_passage(
     Yields
     ------
     ForcedPoint
-        Points not in `done`: ``low`` and ``found`` of the first passage, ``high`` for repeats, ``branch`` for the branch.
+        Points not in `done`: ``low`` and ``found`` of the first passage, ``high`` for repeats, ``branch`` for the
+        branch.
     """
     curve = ForcedCurve(problem, (problem.low.harmonics,), raises=False)
     passage = [p for p in done if p.stage in ("low", "found")]
@@ -132,8 +133,9 @@ def _followed(
 ) -> Iterator[ForcedPoint]:
     """Follow the branch with many harmonics through a run of repeats that did not all converge, and append to `branch`.
 
-    Where the two orders differ much, the branch may fold. Some frequencies then have no solution near the low-order one, and only the
-    branch leads through. It ends at the motion of the next point without an alert, or at the end of the range.
+    Where the two orders differ much, the branch may fold. Some frequencies then have no solution near the low-order
+    one, and only the branch leads through. It ends at the motion of the next point without an alert, or at the end of
+    the range.
     """
     sweep, balance = problem.sweep, problem.high
     end = branch_end(low, last)
@@ -200,7 +202,8 @@ def repeat(
     others
         Accepted points by index: repeats, and points of the first passage without an alert.
     static
-        Function that returns the (n_retained,) static equilibrium, m, for a last attempt by `solve_robustly`; None: no such attempt.
+        Function that returns the (n_retained,) static equilibrium, m, for a last attempt by `solve_robustly`; None: no
+        such attempt.
     branch
         Points of a branch with many harmonics, used as starts where it passed the frequency.
     """
@@ -287,8 +290,8 @@ def _nearest_first(
 ) -> list[tuple[ParameterEvaluation, FloatArray]]:
     """Sort starts by their Newton correction with the Jacobian at the padded low-order solution `q`.
 
-    The residual is a poor measure: a contact that has changed its state adds its stiffness times the motion, however near the solution
-    is. It decides only where the Jacobian is singular.
+    The residual is a poor measure: a contact that has changed its state adds its stiffness times the motion, however
+    near the solution is. It decides only where the Jacobian is singular.
     """
     starts = [(balance.linearise(x, omega), x) for x in (q, *others)]
     jac = starts[0][0].jac
@@ -354,8 +357,9 @@ def _neighbours(index: int, others: Mapping[int, ForcedPoint]) -> list[ForcedPoi
 def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
     """Solve equally spaced or listed frequencies in order; the strategy chooses the harmonics of each.
 
-    A frequency is solved again with additional harmonics as long as the strategy requests them; the last solution counts. A failed
-    frequency is tried once more with the reference harmonics, and at the end from the frequency after it.
+    A frequency is solved again with additional harmonics as long as the strategy requests them; the last solution
+    counts. A failed frequency is tried once more with the reference harmonics, and at the end from the frequency after
+    it.
 
     Parameters
     ----------

@@ -41,15 +41,16 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        With ``high = "auto"``, the kinds of `stickslip.response.continuation.adaptive_continuation.Followed`: ``point``, ``audit``, ``trial``,
-        ``found``. In the published passages, ``low``: first passage; ``high``: repeat with more harmonics; ``branch``: on the branch with
-        more harmonics, where repeats failed. In all responses, ``peak``: added to resolve the peak; ``check``: a ``peak`` with more
-        harmonics, for comparison; ``in_time``: a failed frequency solved from time integration; ``settled``: with more harmonics, where
-        only a prediction judged the point before; ``compared``: with more harmonics, for comparison. Among several ``peak`` or
-        ``settled`` points at a frequency, the one with most harmonics counts.
+        With ``high = "auto"``, the kinds of `stickslip.response.continuation.adaptive_continuation.Followed`:
+        ``point``, ``audit``, ``trial``, ``found``. In the published passages, ``low``: first passage; ``high``: repeat
+        with more harmonics; ``branch``: on the branch with more harmonics, where repeats failed. In all responses,
+        ``peak``: added to resolve the peak; ``check``: a ``peak`` with more harmonics, for comparison; ``in_time``: a
+        failed frequency solved from time integration; ``settled``: with more harmonics, where only a prediction judged
+        the point before; ``compared``: with more harmonics, for comparison. Among several ``peak`` or ``settled``
+        points at a frequency, the one with most harmonics counts.
     index
-        Position in the stage. A ``high`` point has the index of the ``low`` point that it repeats, a ``branch`` point the index of the
-        first repeat that it replaces.
+        Position in the stage. A ``high`` point has the index of the ``low`` point that it repeats, a ``branch`` point
+        the index of the first repeat that it replaces.
     omega
         Frequency, rad/s.
     coefficients
@@ -73,7 +74,8 @@ class ForcedPoint:
     start
         (H+1, n_retained) starting coefficients of that solution, m; empty: no start, or no request.
     kept
-        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, else 0; empty: all coordinates keep all harmonics.
+        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, else 0; empty: all coordinates keep all
+        harmonics.
     marched
         Results of time integration, in the order of `stickslip.response.forced.from_time.Marched`; empty without one.
     shot

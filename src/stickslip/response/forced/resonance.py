@@ -44,8 +44,8 @@ def resolve_peak(
     Yields
     ------
     ForcedPoint
-        Points not in `done`: ``peak``, the one with most harmonics counts at each frequency; ``check`` with more harmonics, for
-        comparison.
+        Points not in `done`: ``peak``, the one with most harmonics counts at each frequency; ``check`` with more
+        harmonics, for comparison.
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
     search = _Search(problem, iter(done))  # an iterator is consumed as far as the peak needs it

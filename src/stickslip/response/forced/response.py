@@ -48,7 +48,8 @@ def forced_response(
     sweep
         Range, harmonics, alert.
     done
-        Points of an interrupted run, in their order. They are not computed again, and the remaining points are the same.
+        Points of an interrupted run, in their order. They are not computed again, and the remaining points are the
+        same.
 
     Yields
     ------

@@ -1,6 +1,7 @@
 """Doubtful points, solved again with more harmonics until two levels agree.
 
-The point's own prediction decides whether it is solved again, not the number of requested points. Each point has its own budget.
+The point's own prediction decides whether it is solved again, not the number of requested points. Each point has its
+own budget.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -57,8 +58,8 @@ def settle(
     Yields
     ------
     ForcedPoint
-        Points not in `stored`: ``settled`` (``peak`` at a peak), which replaces the point with fewer harmonics; ``compared`` (``check``) for
-        comparison.
+        Points not in `stored`: ``settled`` (``peak`` at a peak), which replaces the point with fewer harmonics;
+        ``compared`` (``check``) for comparison.
     """
     if not problem.strategy.verifies:
         return
@@ -96,8 +97,9 @@ def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoi
 def _settles(problem: ForcedProblem, change: float, audit: ForcedPoint) -> bool:
     """Whether a solution with more harmonics confirms a doubtful point.
 
-    The change to this solution plus its own predicted error has to stay below the threshold, since an even higher harmonic may excite a mode. A mode of
-    damping ratio 0.001 at the 13th harmonic changed the first by 6.7 %; the change from five to nine harmonics was 2.3 %, the prediction of nine 4.6 %.
+    The change to this solution plus its own predicted error has to stay below the threshold, since an even higher
+    harmonic may excite a mode. A mode of damping ratio 0.001 at the 13th harmonic changed the first by 6.7 %; the
+    change from five to nine harmonics was 2.3 %, the prediction of nine 4.6 %.
     """
     return change + own_error(problem, audit) <= problem.strategy.threshold
 

@@ -32,45 +32,52 @@ class Sweep:
     low
         Initial harmonics: the highest one, or a list such as (1, 3, 5). The static term is always kept.
     high
-        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41; twice these for a load in harmonic 2 alone) until the estimated
-        error is below the threshold, and audited. A number or a list: harmonics of the repeats, which are the reference of the published
-        Jacobian Alert; no point has more. Strategies that do not verify take 5 for ``auto``.
+        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41; twice these for a load in harmonic 2 alone)
+        until the estimated error is below the threshold, and audited. A number or a list: harmonics of the repeats,
+        which are the reference of the published Jacobian Alert; no point has more. Strategies that do not verify take 5
+        for ``auto``.
     cap
         Highest harmonic of ``auto``; points that need more are doubtful.
     samples
         Samples per period of the contact forces.
     evaluator
-        Evaluation of piecewise-linear laws. ``events`` has no sampling error, which would add small corners and folds to branches.
+        Evaluation of piecewise-linear laws. ``events`` has no sampling error, which would add small corners and folds
+        to branches.
     threshold
         Predicted error (fraction) above which a frequency is repeated.
     selection
-        Name of a strategy of `stickslip.harmonic.selection` (``guarded_alert``, the published ``jacobian_alert``, ...), a strategy object, or the
-        same harmonics at every frequency (``always_low``, ``always_high``).
+        Name of a strategy of `stickslip.harmonic.selection` (``guarded_alert``, the published ``jacobian_alert``, ...),
+        a strategy object, or the same harmonics at every frequency (``always_low``, ``always_high``).
     passages
-        ``double``: complete the response with few harmonics, then repeat the points that need more; ``single``: settle each of the
-        equally spaced frequencies before the next. Strategies that predict the harmonics of the next frequency always use ``single``. Not
-        used with ``high = "auto"``.
+        ``double``: complete the response with few harmonics, then repeat the points that need more; ``single``: settle
+        each of the equally spaced frequencies before the next. Strategies that predict the harmonics of the next
+        frequency always use ``single``. Not used with ``high = "auto"``.
     error_harmonics
         Harmonics of the predicted error; None: the driven ones.
     relative_to
-        Reference of the predicted error. ``answer``: the vector of an output's complex amplitudes, or 1 % of the largest output of its unit
-        if that is more. ``each``: each harmonic of each dof separately, without those that hardly move, as published.
+        Reference of the predicted error. ``answer``: the vector of an output's complex amplitudes, or 1 % of the
+        largest output of its unit if that is more. ``each``: each harmonic of each dof separately, without those that
+        hardly move, as published.
     amplitude_of
-        Definition of an output's amplitude: ``first``, of the driven harmonics; ``half_peak_to_peak``; ``rms``, over a period about the mean.
+        Definition of an output's amplitude: ``first``, of the driven harmonics; ``half_peak_to_peak``; ``rms``, over a
+        period about the mean.
     points
         Smallest number of points of the first passage; curved parts of the branch get more.
     frequencies
-        Number of equally spaced frequencies to step through instead of following the branch by arc length; 0: arc length.
+        Number of equally spaced frequencies to step through instead of following the branch by arc length; 0: arc
+        length.
     at
-        Listed frequencies to step through instead, rad/s, ascending (or descending if the direction is ``down``), all within the range.
+        Listed frequencies to step through instead, rad/s, ascending (or descending if the direction is ``down``), all
+        within the range.
     direction
         ``up``: from the smallest frequency to the largest; ``down``: the reverse, which finds other motions near folds.
     peak_points
         Largest number of points added to resolve the peak.
     rescue
-        Attempts at a failed frequency. ``off``: the corrector from neighbours, from the bonded vibration and from few harmonics, without
-        a branch between listed frequencies. ``in_time``: then from time integration, if the motion repeats; if not, the point records
-        this. ``all``: homotopies and other globalisations before time integration, 300 Newton steps at a point of 60 unknowns.
+        Attempts at a failed frequency. ``off``: the corrector from neighbours, from the bonded vibration and from few
+        harmonics, without a branch between listed frequencies. ``in_time``: then from time integration, if the motion
+        repeats; if not, the point records this. ``all``: homotopies and other globalisations before time integration,
+        300 Newton steps at a point of 60 unknowns.
     newton
         Corrector options.
     """

@@ -1,7 +1,8 @@
 """Backbones: frequency and damping ratio of a mode over its amplitude, from full stick on.
 
-The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 59-71) replaces the damping C by ``C - ξ M``. Then a periodic motion exists
-at every amplitude, and ``ξ / 2ω`` is its damping ratio without the added term. For a conservative mode ξ is zero.
+The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 59-71) replaces the damping C by ``C - ξ
+M``. Then a periodic motion exists at every amplitude, and ``ξ / 2ω`` is its damping ratio without the added term. For a
+conservative mode ξ is zero.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -56,18 +57,20 @@ class ModePoint:
     modal_amplitude
         ``sqrt(X_1^H M X_1)``, kg^0.5 m.
     energy
-        Twice the mean kinetic energy of all harmonics, J, on a wheel of one sector. With linear springs this is the total energy.
+        Twice the mean kinetic energy of all harmonics, J, on a wheel of one sector. With linear springs this is the
+        total energy.
     order
         Highest harmonic.
     status
         How the solver ended; a point that did not converge is no motion.
     slipping
-        Share of the contact points that slip or open at some time; a contact with several sliders counts by its share of slipping ones.
+        Share of the contact points that slip or open at some time; a contact with several sliders counts by its share
+        of slipping ones.
     open_for
         Share of the period for which a contact point is open, the largest over all points.
     change
-        Predicted relative change of frequency or damping ratio with more harmonics, the larger one. On the last level, the change from
-        fewer harmonics; NaN with one set of harmonics.
+        Predicted relative change of frequency or damping ratio with more harmonics, the larger one. On the last level,
+        the change from fewer harmonics; NaN with one set of harmonics.
     sticking
         Share of the points that can slip which stick throughout.
     """
@@ -140,21 +143,21 @@ class ModeSweep:
     Parameters
     ----------
     span
-        First and last amplitude of the coordinate, m, for a motion in the shape of the linear mode. Other motions count by their kinetic
-        energy over the square of the frequency. None: from half the amplitude at the onset of slip to 300 times the onset, or to gross
-        slip. Contacts that never slip or open need a span.
+        First and last amplitude of the coordinate, m, for a motion in the shape of the linear mode. Other motions count
+        by their kinetic energy over the square of the frequency. None: from half the amplitude at the onset of slip to
+        300 times the onset, or to gross slip. Contacts that never slip or open need a span.
     points
         Smallest number of points.
     most_harmonics
-        Highest harmonic. The number of harmonics is raised from h to 2 h + 1 where frequency or damping ratio would change by more than
-        `tolerance`. It stays fixed if this is at most the initial number.
+        Highest harmonic. The number of harmonics is raised from h to 2 h + 1 where frequency or damping ratio would
+        change by more than `tolerance`. It stays fixed if this is at most the initial number.
     tolerance
         Acceptable relative change of frequency or damping ratio with more harmonics.
     to_gross_slip
         Whether the curve ends at gross slip: every contact that can slip has opened or slipped with all its sliders.
     concept
-        ``periodic``: motions sustained by negative damping (Krack 2015); ``decaying``: free decaying motions, ``e^{λt}`` and its powers
-        (Laxalde & Thouverez 2009).
+        ``periodic``: motions sustained by negative damping (Krack 2015); ``decaying``: free decaying motions,
+        ``e^{λt}`` and its powers (Laxalde & Thouverez 2009).
     """
 
     span: tuple[float, float] | None = None
@@ -284,7 +287,8 @@ def nonlinear_mode(
     Raises
     ------
     InputError
-        If a contact is rigid, a harmonic load acts, the coordinate is at rest in the mode, or the span is missing and no contact slips.
+        If a contact is rigid, a harmonic load acts, the coordinate is at rest in the mode, or the span is missing and
+        no contact slips.
     """
     way = mode_way(system, load, mode, dof, how, sweep)
     return way.backbone(tuple(way.follow()))

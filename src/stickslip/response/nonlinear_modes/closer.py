@@ -4,8 +4,8 @@ The continuation controls its steps by the change of the shape and may step over
 
 - knee: interpolation between the neighbours misses a point;
 - extreme: the vertex of the parabola through an extreme value and its neighbours differs from that value;
-- internal resonance: the negative eigenvalues of the symmetric part of the Jacobian's block of a harmonic h > 1 change in number where
-  another mode has the frequency hω.
+- internal resonance: the negative eigenvalues of the symmetric part of the Jacobian's block of a harmonic h > 1 change
+  in number where another mode has the frequency hω.
 """
 
 from collections.abc import Iterator, Sequence
@@ -50,7 +50,8 @@ class Crossing:
     first, last
         Indices of the points on either side.
     share
-        Change of the harmonic's velocity amplitude between them, over the first harmonic; a mode that takes part reverses its sign.
+        Change of the harmonic's velocity amplitude between them, over the first harmonic; a mode that takes part
+        reverses its sign.
     width
         Length of the interval in ln a.
     level
@@ -80,7 +81,8 @@ class Crossing:
 class _Place:
     """Quantities of a point for the tests.
 
-    They are ln a, frequency and damping ratio, the motion (H + 1, n) over a, and for each harmonic from 2 on the number of modes below it.
+    They are ln a, frequency and damping ratio, the motion (H + 1, n) over a, and for each harmonic from 2 on the number
+    of modes below it.
     """
 
     p: float

@@ -45,7 +45,8 @@ class ModeCurve(Curve):
     tolerance
         Relative change of frequency or damping ratio beyond which harmonics are raised.
     decaying
-        Whether motions are free decays with the complex eigenvalue λ. Otherwise they are steady motions sustained by negative damping.
+        Whether motions are free decays with the complex eigenvalue λ. Otherwise they are steady motions sustained by
+        negative damping.
     """
 
     problems: tuple[SelfExcited, ...]
@@ -269,7 +270,8 @@ class Phase:
 def by_energy(problem: SelfExcited) -> tuple[Size, Phase]:
     """Return the amplitude and phase conditions of a mode from its kinetic energy.
 
-    The linear mode has size one where its coordinate has amplitude one. The mass matrix is condensed at the frequency of the linear mode.
+    The linear mode has size one where its coordinate has amplitude one. The mass matrix is condensed at the frequency
+    of the linear mode.
     """
     linear, mode = problem.balance.linear, problem.mode
     own = problem.system.structure.of_harmonic(1)

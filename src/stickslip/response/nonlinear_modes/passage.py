@@ -1,13 +1,15 @@
 """Transient passage through a resonance: slowly varying amplitude of a nonlinear mode under a force with swept frequency.
 
-The complex modal amplitude ``A = a exp(iθ)`` is relative to a force of phase φ with ``dφ/dt = Ω(t)``. The modal stiffness of `sdof_oscillator` is a
-product ``(iΩ - λ) (iΩ + d + λ)`` with the dashpots d and an eigenvalue λ, near ``-ζω + iω``, that depends on the amplitude. The equation of motion is
-nearly the same product with ``d/dt + iΩ`` in place of ``iΩ``. The motion of its second factor oscillates at about 2Ω in this frame and follows the
-force without delay. The slow equation is
+The complex modal amplitude ``A = a exp(iθ)`` is relative to a force of phase φ with ``dφ/dt = Ω(t)``. The modal
+stiffness of `sdof_oscillator` is a product ``(iΩ - λ) (iΩ + d + λ)`` with the dashpots d and an eigenvalue λ, near
+``-ζω + iω``, that depends on the amplitude. The equation of motion is nearly the same product with ``d/dt + iΩ`` in
+place of ``iΩ``. The motion of its second factor oscillates at about 2Ω in this frame and follows the force without
+delay. The slow equation is
 
     (iΩ + d + λ) dA/dt + A dλ/dt = f - (iΩ - λ) (iΩ + d + λ) A ,
 
-where λ depends on the amplitude only. Its steady motions agree with the synthesis, and its free motions have the right decay and frequency.
+where λ depends on the amplitude only. Its steady motions agree with the synthesis, and its free motions have the right
+decay and frequency.
 """
 
 from dataclasses import dataclass
@@ -84,7 +86,8 @@ class Passage:
     finished
         Whether the last frequency was reached; otherwise the motion grew beyond the backbone.
     change
-        Largest relative change of the complex amplitude per radian of the vibration, above half the peak. The method assumes a small value.
+        Largest relative change of the complex amplitude per radian of the vibration, above half the peak. The method
+        assumes a small value.
     """
 
     time: FloatArray
@@ -113,7 +116,8 @@ def passage_through_resonance(oscillator: ModalOscillator, level: float, sweep: 
     level
         Factor on the harmonic load.
     sweep
-        Range and rate. The passage begins with the steady motion at the first frequency, the smallest if there are several.
+        Range and rate. The passage begins with the steady motion at the first frequency, the smallest if there are
+        several.
 
     Raises
     ------

@@ -1,13 +1,13 @@
 """Backbone as an oscillator of one degree of freedom: frequency, damping and force at every amplitude.
 
-Damping of ``-2 ζ ω`` times the mass sustains the motion of a nonlinear mode. A force of the frequency Ω that sustains it instead follows
-from the balance of the first harmonic, weighted by the shape ψ of unit modal mass:
+Damping of ``-2 ζ ω`` times the mass sustains the motion of a nonlinear mode. A force of the frequency Ω that sustains
+it instead follows from the balance of the first harmonic, weighted by the shape ψ of unit modal mass:
 
     D(Ω, a) a = ψᴴ f ,    D = ω² - Ω² + i (2 ζ ω² + (Ω - ω) ψᴴ C ψ) .
 
-Friction forces do not depend on the frequency of a motion, dashpot forces do. M. Krack, L. Panning-von Scheidt and J. Wallaschek, "On the computation
-of the slow dynamics of nonlinear modes of mechanical systems", Mechanical Systems and Signal Processing 42 (2014) 71-87, use ``2 i ζ ω Ω`` for all
-damping.
+Friction forces do not depend on the frequency of a motion, dashpot forces do. M. Krack, L. Panning-von Scheidt and J.
+Wallaschek, "On the computation of the slow dynamics of nonlinear modes of mechanical systems", Mechanical Systems and
+Signal Processing 42 (2014) 71-87, use ``2 i ζ ω Ω`` for all damping.
 """
 
 from collections.abc import Sequence
@@ -89,7 +89,8 @@ class Oscillation:
 class ModalOscillator:
     """Backbone under a load; `modal_oscillator` makes one.
 
-    The position on the backbone is the accumulated change of ln a from its beginning; it grows also where the amplitude turns back.
+    The position on the backbone is the accumulated change of ln a from its beginning; it grows also where the amplitude
+    turns back.
 
     Parameters
     ----------
@@ -204,8 +205,8 @@ def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
     Raises
     ------
     InputError
-        If the load drives another harmonic than the first, does not drive the mode, or has another static part than the backbone; or if the
-        backbone has too few converged points.
+        If the load drives another harmonic than the first, does not drive the mode, or has another static part than the
+        backbone; or if the backbone has too few converged points.
     """
     points = [p for p in backbone.points if p.status.converged]
     if len(points) < MIN_BACKBONE_POINTS:

@@ -1,17 +1,19 @@
 """Validity of the single-mode assumption: linear response of the other modes under the same force.
 
-The other modes are linear, with stuck contacts. Their response is the response of the linear structure without the followed mode, to the force that
-remains in the equations of motion of the backbone. While nothing slips, the sum of both is the exact response. Where contacts slip, the other modes
-move the contacts too, which the backbone neglects. The amplitude of a resonance is then wrong by about
+The other modes are linear, with stuck contacts. Their response is the response of the linear structure without the
+followed mode, to the force that remains in the equations of motion of the backbone. While nothing slips, the sum of
+both is the exact response. Where contacts slip, the other modes move the contacts too, which the backbone neglects. The
+amplitude of a resonance is then wrong by about
 
     foreign = m max(1 - S, 1/5) + (ζ / δ)² ,
 
-where m is the motion of the other modes over the followed mode, in the output or in the contact gaps; S the growth ``d ln a / d ln level``, which is
-small where slip limits the gap; ζ the damping ratio; and δ the relative distance to the next frequency. `docs/theory/modal_synthesis.md` compares this
-estimate with solutions.
+where m is the motion of the other modes over the followed mode, in the output or in the contact gaps; S the growth ``d
+ln a / d ln level``, which is small where slip limits the gap; ζ the damping ratio; and δ the relative distance to the
+next frequency. `docs/theory/modal_synthesis.md` compares this estimate with solutions.
 
-At a peak the other modes are small beside the followed one; away from it they may reach a fifth. Where the amplitude grows steeply with the load, as on
-the flank of a peak that slip softens, a small motion of the other modes has a large effect. `along` returns where one mode dominates.
+At a peak the other modes are small beside the followed one; away from it they may reach a fifth. Where the amplitude
+grows steeply with the load, as on the flank of a peak that slip softens, a small motion of the other modes has a large
+effect. `along` returns where one mode dominates.
 """
 
 from dataclasses import dataclass, replace
@@ -137,7 +139,8 @@ def other_modes(oscillator: ModalOscillator) -> OtherModes:
 def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
     """Return the (p, n) residual forces of the equations of motion at synthesised points, N; their modal component is zero.
 
-    Backbone motions have mass-proportional damping instead of the load, and another frequency. Both act on the other modes.
+    Backbone motions have mass-proportional damping instead of the load, and another frequency. Both act on the other
+    modes.
     """
     structure = oscillator.backbone.system.structure.of_harmonic(1)
     here = oscillator.at(found.place)

@@ -1,9 +1,10 @@
 """Nonlinear modal synthesis: forced response at any load level from one backbone, without solving the equations of motion again.
 
-At each amplitude of the backbone, the frequencies at which a load level sustains it are roots of a quartic polynomial in Ω (see `sdof_oscillator`):
-one below and one above the resonance. There is no root where the amplitude needs a higher level at every frequency. Peaks therefore lie where the
-smallest level that sustains the amplitude equals the load level. Each stretch of the backbone below the load level is a curve: the first contains small
-amplitudes, the others are detached.
+At each amplitude of the backbone, the frequencies at which a load level sustains it are roots of a quartic polynomial
+in Ω (see `sdof_oscillator`): one below and one above the resonance. There is no root where the amplitude needs a higher
+level at every frequency. Peaks therefore lie where the smallest level that sustains the amplitude equals the load
+level. Each stretch of the backbone below the load level is a curve: the first contains small amplitudes, the others are
+detached.
 
 Design curves follow from the same backbone: the peak over the load level, and over quantities that scale like it.
 """
@@ -308,8 +309,8 @@ class PeakCurve:
     def per_load(self) -> FloatArray:
         """Peak over level, m.
 
-        For homogeneous contact laws this is also the curve over a damper's static load: with s times the static load and the same
-        vibration load, the peak is s times the peak of level 1/s.
+        For homogeneous contact laws this is also the curve over a damper's static load: with s times the static load
+        and the same vibration load, the peak is s times the peak of level 1/s.
         """
         return self.amplitude / self.level
 
@@ -327,8 +328,8 @@ def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
 def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = None) -> bool:
     """Whether contact forces are proportional to displacements: laws without a preload, gap or limit of their own.
 
-    The motion is then proportional to static and vibration loads together, and one backbone serves all static loads. The test uses the
-    motion of largest amplitude.
+    The motion is then proportional to static and vibration loads together, and one backbone serves all static loads.
+    The test uses the motion of largest amplitude.
     """
     backbone = oscillator.backbone
     balance = (how or Discretisation()).balance(backbone.system, oscillator.load, np.array([backbone.dof]))

@@ -1,7 +1,7 @@
 """Motions without a period, in time: envelope, statistics and spectrum, and the test whether they have settled.
 
-A motion that never repeats has no amplitude, but once settled, its windows agree in largest amplitude, mean and root mean square. The integration
-continues until they do, or until a budget of work is spent. Only the second half counts.
+A motion that never repeats has no amplitude, but once settled, its windows agree in largest amplitude, mean and root
+mean square. The integration continues until they do, or until a budget of work is spent. Only the second half counts.
 """
 
 from dataclasses import dataclass, replace
@@ -99,7 +99,8 @@ class Statistics:
     spread
         Largest relative difference between windows of equal length, in largest amplitude and root mean square.
     hertz, peaks
-        (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum; NaN if there are fewer.
+        (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum; NaN if there are
+        fewer.
     periods
         Number of periods in the second half.
     """
@@ -296,8 +297,8 @@ def two_loads_in_time(
     Returns
     -------
     tuple or None
-        Largest and smallest amplitude (outputs,) in time, m, and the root-mean-square difference from the balance, relative to the
-        vibration. None for loads that beat too slowly, or without a solution at the ratio.
+        Largest and smallest amplitude (outputs,) in time, m, and the root-mean-square difference from the balance,
+        relative to the vibration. None for loads that beat too slowly, or without a solution at the ratio.
     """
     p, q = _turns(motion)
     base = motion.omegas[0] / p

@@ -62,7 +62,8 @@ class TorusMotion:
     unsettled
         Number of contacts whose state did not repeat on a characteristic.
     left_out
-        Largest relative change of a coordinate (root mean square) by a Newton step with further combined frequencies; NaN if not computed.
+        Largest relative change of a coordinate (root mean square) by a Newton step with further combined frequencies;
+        NaN if not computed.
     """
 
     indices: Indices
@@ -345,15 +346,16 @@ def with_enough(
 ) -> tuple[TwoTones, TorusMotion]:
     """Add combined frequencies until the omitted ones would change the motion by less than `tolerance`.
 
-    The combined frequencies with the largest response to contact forces are added, not all up to an order, since almost any order has some
-    combined frequency near a lightly damped resonance.
+    The combined frequencies with the largest response to contact forces are added, not all up to an order, since almost
+    any order has some combined frequency near a lightly damped resonance.
 
     Parameters
     ----------
     problem, motion
         Initial problem and motion.
     most
-        Largest sum of harmonics. The error estimate includes sums up to `BEYOND` more, and the judging set of the loads.
+        Largest sum of harmonics. The error estimate includes sums up to `BEYOND` more, and the judging set of the
+        loads.
     tolerance
         Relative tolerance of the root mean square.
     solve

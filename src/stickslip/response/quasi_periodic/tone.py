@@ -1,9 +1,10 @@
 """Motions with a self-excited second frequency, by instability of the forced motion or by flutter, and the search for them.
 
-Beyond a Neimark-Sacker point a second tone with its own frequency grows out of the forced motion. Its phase is arbitrary, so its frequency is an
-additional unknown. For a given amplitude ``a`` of the second tone, another unknown is the *level*: the damping that is removed from all combined
-frequencies of the second tone to sustain it. The level is small and negative at first, and zero where the motion sustains itself. The curve over ``a``
-begins with the growing disturbance, at the angle of its multiplier or the frequency of its mode.
+Beyond a Neimark-Sacker point a second tone with its own frequency grows out of the forced motion. Its phase is
+arbitrary, so its frequency is an additional unknown. For a given amplitude ``a`` of the second tone, another unknown is
+the *level*: the damping that is removed from all combined frequencies of the second tone to sustain it. The level is
+small and negative at first, and zero where the motion sustains itself. The curve over ``a`` begins with the growing
+disturbance, at the angle of its multiplier or the frequency of its mode.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -62,7 +63,8 @@ class Beginning:
     position
         Position of the retained coordinate whose amplitude is prescribed.
     defect
-        Smallest over largest singular value of the linearised equations of the second tone; zero at a Neimark-Sacker point.
+        Smallest over largest singular value of the linearised equations of the second tone; zero at a Neimark-Sacker
+        point.
     share
         Share of the uncombined second frequency in the shape.
     """
@@ -366,7 +368,8 @@ class Found:
     forced
         Forced motion without a second tone.
     ratio
-        Damping ratio at small amplitudes of the last examined second tone, or of a growing one if there is any; NaN if none was examined.
+        Damping ratio at small amplitudes of the last examined second tone, or of a growing one if there is any; NaN if
+        none was examined.
     near
         Frequency of this tone, rad/s; NaN if none was examined.
     """

@@ -69,9 +69,11 @@ class Bound:
     sliders
         (n_springs, 2) initial slider positions of the springs of `TractionBounds.springs`, m.
     multipliers
-        (n_springs, 2) tractions along t and w at t = 0, over the friction limit; NaN for springs that do not stick throughout.
+        (n_springs, 2) tractions along t and w at t = 0, over the friction limit; NaN for springs that do not stick
+        throughout.
     error
-        Predicted relative change of the output by the harmonics of its judging set; 0 without forces on them, NaN if unknown.
+        Predicted relative change of the output by the harmonics of its judging set; 0 without forces on them, NaN if
+        unknown.
     """
 
     amplitude: float
@@ -103,8 +105,8 @@ class TractionBounds:
     solves, failures
         Number of solved motions, and of starts without a solution.
     branches
-        Number of motions from the model's own start; above one if sweeps met other branches at this frequency. The bounds include them
-        all.
+        Number of motions from the model's own start; above one if sweeps met other branches at this frequency. The
+        bounds include them all.
     """
 
     omega: float
@@ -181,8 +183,9 @@ def traction_bounds(
 ) -> Iterator[TractionBounds]:
     """Find the smallest and the largest amplitude of an output over all residual tractions of sticking contacts.
 
-    With laws other than friction under a constant normal load, the response may be multi-valued. Sweeps up and down a wider range then
-    search for other branches, and the bounds include all motions that they meet. They do not meet isolated branches.
+    With laws other than friction under a constant normal load, the response may be multi-valued. Sweeps up and down a
+    wider range then search for other branches, and the bounds include all motions that they meet. They do not meet
+    isolated branches.
 
     Parameters
     ----------
@@ -209,7 +212,8 @@ def traction_bounds(
     Raises
     ------
     InputError
-        If a contact is rigid, a law has no initial slider positions, a frequency is not positive, or the output does not exist.
+        If a contact is rigid, a law has no initial slider positions, a frequency is not positive, or the output does
+        not exist.
     """
     setup = _setup(system, load, omegas, output, discretisation)
     if may_be_several(system.interface):
@@ -237,8 +241,9 @@ def resonance_bounds(
 ) -> TractionBounds:
     """Find the maximum of a bound over the frequency, between known bounds: the bound of the resonance amplitude.
 
-    For any tractions, constant or changing with the frequency, the resonance amplitude lies between the maximum of the smallest amplitudes
-    and the maximum of the largest ones. Where several motions were met, both bounds include all of them.
+    For any tractions, constant or changing with the frequency, the resonance amplitude lies between the maximum of the
+    smallest amplitudes and the maximum of the largest ones. Where several motions were met, both bounds include all of
+    them.
 
     Parameters
     ----------

@@ -1,11 +1,12 @@
 """Periodic motion as a function of the slider positions, and the gradient of an amplitude.
 
-The sliders s enter through the gaps only, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact derivatives
-for the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs that slip, open, or were dragged to
-their position have forgotten their start: their column is zero.
+The sliders s enter through the gaps only, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column
+of the contact derivatives for the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ
+J⁻ᵀ ∂A/∂x``. Springs that slip, open, or were dragged to their position have forgotten their start: their column is
+zero.
 
-The admissible slider positions of a planar contact are the intersection of the discs of all instants: in units of force the slider is at
-``z = K s``, and rests while ``|K x(t) - z| <= μN(t)``.
+The admissible slider positions of a planar contact are the intersection of the discs of all instants: in units of force
+the slider is at ``z = K s``, and rests while ``|K x(t) - z| <= μN(t)``.
 """
 
 from collections.abc import Iterable
@@ -47,8 +48,8 @@ class Room:
     slider
         (n, 2) rest position, m; zero for other springs.
     middle, half
-        (n, 2) middle and half width of the interval in which the slider may rest, m; for a planar contact, a point deep inside all discs and
-        its distance from the edge.
+        (n, 2) middle and half width of the interval in which the slider may rest, m; for a planar contact, a point deep
+        inside all discs and its distance from the edge.
     multiplier
         (n, 2) traction at t = 0 over the friction limit; NaN for springs that do not stick.
     centres, limits

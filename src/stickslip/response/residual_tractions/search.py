@@ -1,8 +1,8 @@
 """Smallest and largest amplitude over all slider positions, by adjoint gradients from several starts.
 
-If a slider starts beyond the interval in which it may rest, the motion drags it back to the end. Every start is therefore admissible. Extremes
-usually lie at ends of the intervals, which are reached by overshooting: a step goes along the gradient of each spring, first in full, then in
-shorter fractions.
+If a slider starts beyond the interval in which it may rest, the motion drags it back to the end. Every start is
+therefore admissible. Extremes usually lie at ends of the intervals, which are reached by overshooting: a step goes
+along the gradient of each spring, first in full, then in shorter fractions.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -31,8 +31,8 @@ class TractionSearch:
     Parameters
     ----------
     starts
-        Number of random starts in addition to the fixed ones: the model's own start, all springs at one end of their intervals, all at the
-        other end, and every corner for few springs.
+        Number of random starts in addition to the fixed ones: the model's own start, all springs at one end of their
+        intervals, all at the other end, and every corner for few springs.
     seed
         Seed of the random numbers.
     """

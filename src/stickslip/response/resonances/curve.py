@@ -43,8 +43,8 @@ def peak_curve(search: PeakSearch, span: tuple[float, float], points: int = 30, 
     Yields
     ------
     PeakPoint
-        Points in the order of the curve, until it leaves the span at its last value or, after a fold, at its first one. Where the curve is
-        lost, a point without convergence follows, and a restart a little further on.
+        Points in the order of the curve, until it leaves the span at its last value or, after a fold, at its first one.
+        Where the curve is lost, a point without convergence follows, and a restart a little further on.
 
     Raises
     ------

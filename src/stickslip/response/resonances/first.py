@@ -44,8 +44,9 @@ class PeakSearch:
     harmonic
         Harmonic whose amplitude peaks, for example in a superharmonic resonance; None: the driven harmonics.
     periods
-        Periods of the load after which the motion repeats; 2 or more for subharmonic resonances. Harmonics, energies and phases then
-        refer to the lower frequency, and the default harmonic is the lowest one. `omega_range` always refers to the load.
+        Periods of the load after which the motion repeats; 2 or more for subharmonic resonances. Harmonics, energies
+        and phases then refer to the lower frequency, and the default harmonic is the lowest one. `omega_range` always
+        refers to the load.
 
     Raises
     ------

@@ -24,8 +24,8 @@ class PeakPoint:
     amplitude
         Amplitude of the output in the driven harmonic or the requested one, m; for several driven harmonics, the norm.
     phase
-        Phase of the output relative to the force, rad, in the first of these harmonics; -π/2 in quadrature. For a harmonic h that the load
-        does not drive, relative to h times the phase of the force.
+        Phase of the output relative to the force, rad, in the first of these harmonics; -π/2 in quadrature. For a
+        harmonic h that the load does not drive, relative to h times the phase of the force.
     slope
         Derivative of the amplitude by the parameter along the curve of peaks, m over the parameter's unit.
     curvature
@@ -35,8 +35,8 @@ class PeakPoint:
     friction
         Dissipation of the contacts, J.
     below
-        Relative height of the nearby maximum above this point, from slope and curvature of the response; 0 at a horizontal tangent, NaN
-        without a maximum.
+        Relative height of the nearby maximum above this point, from slope and curvature of the response; 0 at a
+        horizontal tangent, NaN without a maximum.
     coefficients
         (order+1, n) complex displacement of all dofs of the structure, m.
     status

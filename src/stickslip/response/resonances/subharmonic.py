@@ -1,7 +1,7 @@
 """Search for subharmonic resonances on branches isolated from the response.
 
-Newton's method starts from the period-one response plus the motion of least resistance at the lower frequency, with various amplitudes and phases. The
-branch of a solution is then followed over the frequency in both directions.
+Newton's method starts from the period-one response plus the motion of least resistance at the lower frequency, with
+various amplitudes and phases. The branch of a solution is then followed over the frequency in both directions.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
 """Direct tracking of resonance peaks over a design parameter, without a sweep for each value.
 
-Each peak is the solution of one equation (see `harmonic.peak`), started from the previous peaks. A damper optimisation curve costs a few Newton
-steps for each point, and its lowest point is the root of the exact slope of the peak amplitude. Where a step is too long, intermediate values
-of the parameter are inserted.
+Each peak is the solution of one equation (see `harmonic.peak`), started from the previous peaks. A damper optimisation
+curve costs a few Newton steps for each point, and its lowest point is the root of the exact slope of the peak
+amplitude. Where a step is too long, intermediate values of the parameter are inserted.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -258,9 +258,9 @@ def track_peak(
     omega_range
         Frequency range of the initial sweep for the first peak, rad/s.
     by
-        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to the maximum
-        of a lightly damped resonance, and cheaper; ``variable_phase``: the output has the phase of the maximum near the last peak, which
-        also suits several forces and modes, and harmonics that are not driven.
+        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is
+        close to the maximum of a lightly damped resonance, and cheaper; ``variable_phase``: the output has the phase of
+        the maximum near the last peak, which also suits several forces and modes, and harmonics that are not driven.
     output
         Number of the output whose amplitude peaks.
     discretisation
@@ -274,8 +274,8 @@ def track_peak(
     Raises
     ------
     InputError
-        If there are no values, the parameter, condition or output is unknown, the load drives no harmonic, or the range has no peak at the
-        first value.
+        If there are no values, the parameter, condition or output is unknown, the load drives no harmonic, or the range
+        has no peak at the first value.
     """
     how = discretisation or Discretisation()
     one = PeakSearch(system, load, parameter, omega_range, by, output, how)
@@ -302,8 +302,8 @@ def follow_peaks(
     Yields
     ------
     PeakPoint
-        Points not in `done`, one for each value and peak, with all peaks of a value before the next value. If two peaks merge, the one with
-        the larger change ends.
+        Points not in `done`, one for each value and peak, with all peaks of a value before the next value. If two peaks
+        merge, the one with the larger change ends.
 
     Raises
     ------
@@ -378,7 +378,8 @@ def later_peaks(
     Yields
     ------
     PeakPoint
-        Points from the last value to the first, numbered after the known peaks. A peak ends where it merges with a known one.
+        Points from the last value to the first, numbered after the known peaks. A peak ends where it merges with a
+        known one.
     """
     last = float(values[-1])
     there = [p.omega for p in known if p.value == last and p.converged]

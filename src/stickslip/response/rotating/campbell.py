@@ -55,8 +55,8 @@ class Campbell:
     speeds
         (s,) ascending rotor speeds, rad/s.
     frequencies_hz
-        (s, n_modes) in the rotating frame; columns in the order of the first speed. Negative where a motion diverges instead of
-        vibrating.
+        (s, n_modes) in the rotating frame; columns in the order of the first speed. Negative where a motion diverges
+        instead of vibrating.
     agreement
         (s, n_modes) smallest modal assurance (1: same shape) since the previous speed; ones at the first speed.
     engine_orders
@@ -143,10 +143,12 @@ def campbell(
     Parameters
     ----------
     structure_at
-        Function of the speed, rad/s, that returns the structure in the rotating frame, with centrifugal stiffening and spin softening
-        where they matter. Coordinates must be the same at all speeds, or the structures must expand to the same full model.
+        Function of the speed, rad/s, that returns the structure in the rotating frame, with centrifugal stiffening and
+        spin softening where they matter. Coordinates must be the same at all speeds, or the structures must expand to
+        the same full model.
     speeds
-        Ascending speeds, rad/s. A crossing is found if the sign of frequency minus engine-order frequency changes from one to the next.
+        Ascending speeds, rad/s. A crossing is found if the sign of frequency minus engine-order frequency changes from
+        one to the next.
     n_modes
         Number of modes, counted at the first speed.
     engine_orders
@@ -161,8 +163,8 @@ def campbell(
     Returns
     -------
     Campbell
-        A step with a large change of a shape, or with an exchange of two modes, is halved up to five times: veering modes keep their
-        order, crossing modes keep their shapes. `agreement` shows the remaining doubt.
+        A step with a large change of a shape, or with an exchange of two modes, is halved up to five times: veering
+        modes keep their order, crossing modes keep their shapes. `agreement` shows the remaining doubt.
 
     Raises
     ------

@@ -28,16 +28,18 @@ def cyclic_campbell(
     Parameters
     ----------
     sector_at
-        Function of the speed, rad/s, that returns the sector. It is called for each wave and speed, so it should cache expensive results.
+        Function of the speed, rad/s, that returns the sector. It is called for each wave and speed, so it should cache
+        expensive results.
     speeds
         Ascending speeds, rad/s.
     n_modes
         Number of modes of each wave.
     engine_orders
-        Positive engine orders. On n_s equal sectors, engine order m excites wave number ``m mod n_s`` and has crossings in its diagram only.
+        Positive engine orders. On n_s equal sectors, engine order m excites wave number ``m mod n_s`` and has crossings
+        in its diagram only.
     wave_numbers
-        Wave numbers of the diagrams; None: the ones excited by the engine orders. Without Coriolis forces, waves k and n_s - k have the same
-        frequencies and one diagram, with the smaller number.
+        Wave numbers of the diagrams; None: the ones excited by the engine orders. Without Coriolis forces, waves k and
+        n_s - k have the same frequencies and one diagram, with the smaller number.
     coriolis, tolerance
         As in `campbell`.
     progress

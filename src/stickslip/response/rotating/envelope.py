@@ -106,10 +106,10 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
 
         (2ihω M + C) dQ_h/dt + (Z_h(ω) + i h dω/dt M) Q_h + F_c,h(Q) = F_h ,
 
-    the equation of motion without the second derivative of the amplitude, which would add spurious motions ``exp(-2iωt)`` driven by the
-    contact forces. The static term follows without delay. Contact forces are computed for the periodic motion with the instantaneous
-    amplitudes. Steps use the second-order backward difference formula, with a length controlled by the difference between prediction and
-    solution.
+    the equation of motion without the second derivative of the amplitude, which would add spurious motions
+    ``exp(-2iωt)`` driven by the contact forces. The static term follows without delay. Contact forces are computed for
+    the periodic motion with the instantaneous amplitudes. Steps use the second-order backward difference formula, with
+    a length controlled by the difference between prediction and solution.
 
     Parameters
     ----------
@@ -123,7 +123,8 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
     Yields
     ------
     EnvelopePoint
-        The steady motion at the first frequency, then one point for each step. If a step fails, the last point is not converged.
+        The steady motion at the first frequency, then one point for each step. If a step fails, the last point is not
+        converged.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Flutter of one wave: aerodynamic damping by the energy method and by eigenvalues.
 
-The wave is reduced to its lowest undamped modes. The energy method uses the modes in still fluid and the work of the fluid on each in a
-period. The eigenvalue method couples all modes, with coefficients at the frequency of the motion.
+The wave is reduced to its lowest undamped modes. The energy method uses the modes in still fluid and the work of the
+fluid on each in a period. The eigenvalue method couples all modes, with coefficients at the frequency of the motion.
 """
 
 from collections.abc import Callable, Sequence

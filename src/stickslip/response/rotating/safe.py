@@ -1,7 +1,7 @@
 """Natural frequencies of a bladed disk by nodal diameter, and the SAFE diagram of their resonances with engine orders.
 
-M. P. Singh, J. J. Vargo, D. M. Schiffer and J. D. Dello, "SAFE diagram: a design and reliability tool for turbine blading",
-Proceedings of the 17th Turbomachinery Symposium (1988) 93-101.
+M. P. Singh, J. J. Vargo, D. M. Schiffer and J. D. Dello, "SAFE diagram: a design and reliability tool for turbine
+blading", Proceedings of the 17th Turbomachinery Symposium (1988) 93-101.
 """
 
 import math
@@ -31,7 +31,8 @@ class NodalDiameterMap:
     nodal_diameters
         (k,) ascending, each from 0 to n_s / 2.
     frequencies_hz
-        (k, n_modes) of the wave whose wave number is the nodal diameter; between 0 and n_s / 2 it travels backward, against rotation.
+        (k, n_modes) of the wave whose wave number is the nodal diameter; between 0 and n_s / 2 it travels backward,
+        against rotation.
     forward_hz
         (k, n_modes) of wave number n_s minus nodal diameter; equal to `frequencies_hz` without Coriolis forces.
     shapes
@@ -237,8 +238,8 @@ def safe(
 ) -> Safe:
     """Compare engine orders with the frequencies of the nodal diameters that they excite.
 
-    On a wheel of n_s equal sectors, engine order m does work only on wave number ``m mod n_s``. A resonance therefore needs a matching
-    shape as well as a matching frequency.
+    On a wheel of n_s equal sectors, engine order m does work only on wave number ``m mod n_s``. A resonance therefore
+    needs a matching shape as well as a matching frequency.
 
     Parameters
     ----------
@@ -251,14 +252,15 @@ def safe(
     margin
         Relative distance in speed below which a point counts as a resonance.
     growth
-        Function of the wave number that returns the (n_modes,) derivatives of squared natural frequencies by the squared speed, at the one
-        operating speed. Engine orders then meet the modes along these straight lines (Southwell), as in a Campbell diagram near this
-        speed. None: frequencies do not change with the speed.
+        Function of the wave number that returns the (n_modes,) derivatives of squared natural frequencies by the
+        squared speed, at the one operating speed. Engine orders then meet the modes along these straight lines
+        (Southwell), as in a Campbell diagram near this speed. None: frequencies do not change with the speed.
 
     Raises
     ------
     InputError
-        If a number is invalid, a nodal diameter excited by an engine order is not in the map, or `growth` is given with a range of speeds.
+        If a number is invalid, a nodal diameter excited by an engine order is not in the map, or `growth` is given with
+        a range of speeds.
     """
     low, high = (speed, speed) if isinstance(speed, (int, float)) else speed
     if not 0 < low <= high < math.inf:

@@ -42,7 +42,8 @@ class AmplitudePoint:
     omega
         Frequency, rad/s.
     level
-        Damping ratio of the motion, negative if its amplitude grows; or the value of the parameter for which it is a limit cycle.
+        Damping ratio of the motion, negative if its amplitude grows; or the value of the parameter for which it is a
+        limit cycle.
     order
         Highest harmonic.
     unknowns
@@ -70,7 +71,8 @@ class AmplitudePoint:
 def slip_amplitude(problem: SelfExcited) -> float:
     """Return the amplitude at the onset of slip or lift-off, m, within one percent.
 
-    Contacts at their slip limit under the static load slip at once, but stick again about another mean; this is no onset.
+    Contacts at their slip limit under the static load slip at once, but stick again about another mean; this is no
+    onset.
 
     Raises
     ------
@@ -195,7 +197,8 @@ def parameter_over_amplitude(
     problem
         The mode.
     parameter
-        As in `branch_in_parameter`: a field of the contact laws, or a function of the value, such as a factor on the aerodynamic forces.
+        As in `branch_in_parameter`: a field of the contact laws, or a function of the value, such as a factor on the
+        aerodynamic forces.
     near
         Approximate value of the parameter at the first amplitude.
     cycle

@@ -43,12 +43,13 @@ class LimitCycle:
     omega
         Frequency, rad/s.
     slope
-        ``dζ / d ln √E``, where the kinetic energy E of the first harmonic measures the amplitude of the mode. Positive if the dissipation by
-        friction grows faster than the energy input: then the cycle is attracting.
+        ``dζ / d ln √E``, where the kinetic energy E of the first harmonic measures the amplitude of the mode. Positive
+        if the dissipation by friction grows faster than the energy input: then the cycle is attracting.
     order
         Highest harmonic.
     change
-        Relative change of amplitude or frequency by the last raise of the harmonics, the larger one; NaN without a raise.
+        Relative change of amplitude or frequency by the last raise of the harmonics, the larger one; NaN without a
+        raise.
     enough
         Whether the change is below the tolerance.
     coefficients
@@ -85,8 +86,8 @@ def limit_cycles(
     curve
         Damping over the amplitude, in the order of the branch.
     most_harmonics
-        Highest harmonic. Harmonics are raised from h to 2 h + 1 while amplitude or frequency change by more than `tolerance`. They stay
-        fixed if this is at most the initial number.
+        Highest harmonic. Harmonics are raised from h to 2 h + 1 while amplitude or frequency change by more than
+        `tolerance`. They stay fixed if this is at most the initial number.
     """
     found: list[LimitCycle] = []
     for before, after in crossings(with_extremes(problem, curve)):
@@ -246,7 +247,8 @@ def _cycle(problem: SelfExcited, y: FloatArray, change: float, *, enough: bool) 
 def _slope(problem: SelfExcited, cycle: FloatArray) -> float:
     """Return ``dζ / d ln √E`` along the motions sustained by damping, at a limit cycle.
 
-    The amplitude of one coordinate may fall while the motion grows, as at the onset of slip; the kinetic energy E of the first harmonic does not.
+    The amplitude of one coordinate may fall while the motion grows, as at the onset of slip; the kinetic energy E of
+    the first harmonic does not.
     """
     y, p = np.append(cycle[:-1], 0.0), float(cycle[-1])
     equation = problem.over_amplitude()
@@ -279,7 +281,8 @@ class CycleStability:
     stability
         Stability against all disturbances except the one along the cycle, which only shifts time.
     along
-        Multiplier of the disturbance along the cycle. Its exact value is 1, and the difference indicates the error of the motion.
+        Multiplier of the disturbance along the cycle. Its exact value is 1, and the difference indicates the error of
+        the motion.
     wave
         Disturbance of a wheel with the deciding multiplier; None for a single structure, and if unknown.
     """
@@ -293,7 +296,8 @@ class CycleStability:
 def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
     """Return the stability of a limit cycle; the problem has the same harmonics.
 
-    The error of each multiplier is its change with half as many harmonics, plus the distance from 1 of the multiplier along the cycle.
+    The error of each multiplier is its change with half as many harmonics, plus the distance from 1 of the multiplier
+    along the cycle.
 
     Raises
     ------

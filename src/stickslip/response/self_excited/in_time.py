@@ -192,8 +192,8 @@ class WaveHistory:
 def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
     """Return the waves of a motion from outputs at the same dof of all sectors, in their order.
 
-    In each window of `window` periods, the motion of a wave number is split by the sign of its frequency, since waves k and -k have the same
-    instantaneous shape and travel in opposite directions.
+    In each window of `window` periods, the motion of a wave number is split by the sign of its frequency, since waves k
+    and -k have the same instantaneous shape and travel in opposite directions.
     """
     sectors = marched.samples.shape[1]
     length = window * KEPT

@@ -32,10 +32,11 @@ class StuckMode:
     omega
         Modulus of the eigenvalue, rad/s.
     ratio
-        Damping ratio ``−Re λ / |λ|`` of the eigenvalue with all damping, Coriolis and aerodynamic forces. Negative: the mode grows.
+        Damping ratio ``−Re λ / |λ|`` of the eigenvalue with all damping, Coriolis and aerodynamic forces. Negative: the
+        mode grows.
     shape
-        (n,) complex displacement of all coordinates, normalised to unit modal mass; for a wheel with copies of dofs in several phases, also
-        the constraint forces of the copies.
+        (n,) complex displacement of all coordinates, normalised to unit modal mass; for a wheel with copies of dofs in
+        several phases, also the constraint forces of the copies.
     """
 
     number: int

@@ -1,10 +1,11 @@
 """Autonomous periodic problem: the frequency is unknown, and so is the damping that sustains the motion.
 
-The first harmonic of one coordinate has a given amplitude ``a``, which scales the balance, and zero phase, since the origin of time is
-arbitrary. The additional unknowns are ``ln ω`` and a *level*, which is one of these:
+The first harmonic of one coordinate has a given amplitude ``a``, which scales the balance, and zero phase, since the
+origin of time is arbitrary. The additional unknowns are ``ln ω`` and a *level*, which is one of these:
 
-- mass-proportional damping that sustains the motion. Where it is zero, the motion is a limit cycle. In a model with positive damping it is
-  negative (the extended periodic motion concept of Krack, Computers & Structures 154 (2015) 59-71);
+- mass-proportional damping that sustains the motion. Where it is zero, the motion is a limit cycle. In a model with
+  positive damping it is negative (the extended periodic motion concept of Krack, Computers & Structures 154 (2015)
+  59-71);
 - a parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
 - the amplitude itself, for the limit cycle of the given model.
 """
@@ -137,8 +138,9 @@ class SelfExcited:
     ) -> PeriodicProblem:
         """Return the periodic problem with the parameter ``ln a`` and a level, over `scale`, as the last unknown.
 
-        The level is the damping, unless `family` gives the balance of another level. The conditions `held` on amplitude and phase refer to the
-        coordinate by default. A level that changes linear forces only (`linear_alone`), such as damping, costs no evaluation of contacts.
+        The level is the damping, unless `family` gives the balance of another level. The conditions `held` on amplitude
+        and phase refer to the coordinate by default. A level that changes linear forces only (`linear_alone`), such as
+        damping, costs no evaluation of contacts.
         """
         members = family or self.damped
 
@@ -287,8 +289,8 @@ class Contacts:
     Attributes
     ----------
     slipping
-        Share of the contact points that change their state, among the points that can slip or open; NaN without such points. A contact with
-        several sliders counts by its share of slipping sliders, which is 1 in gross slip only.
+        Share of the contact points that change their state, among the points that can slip or open; NaN without such
+        points. A contact with several sliders counts by its share of slipping sliders, which is 1 in gross slip only.
     sticking
         Share of these contact points that stick throughout, with several sliders counted in the same way.
     open_for

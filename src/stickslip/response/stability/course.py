@@ -26,8 +26,8 @@ class Course:
     order
         (n,) positions of the points in the response.
     sign
-        (n,) sign of the determinant of the balance's Jacobian, NaN where unknown. It is the parity of the number of real multipliers above
-        1, up to one sign for the whole branch.
+        (n,) sign of the determinant of the balance's Jacobian, NaN where unknown. It is the parity of the number of
+        real multipliers above 1, up to one sign for the whole branch.
     cycle
         (n,) transitions of each point; see `cycle_of`.
     fold
@@ -73,7 +73,8 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
     problem
         The solved problem.
     points
-        The accepted points. Points from `along` on resolve the peak; they are inserted at the nearest position of the branch.
+        The accepted points. Points from `along` on resolve the peak; they are inserted at the nearest position of the
+        branch.
     along
         Number of points in the order of the branch.
     jumps
@@ -105,8 +106,8 @@ def course_of(problem: ForcedProblem, points: Sequence[ForcedPoint], along: int,
 def sign_of(problem: ForcedProblem, point: ForcedPoint) -> float:
     """Return the sign of the determinant of the balance's Jacobian at a solution; NaN if unknown.
 
-    On a branch it follows from the tangent and the sign of the continuation's bordered determinant (Cramer's rule). Elsewhere a small
-    Jacobian is factorised.
+    On a branch it follows from the tangent and the sign of the continuation's bordered determinant (Cramer's rule).
+    Elsewhere a small Jacobian is factorised.
     """
     if point.tangent.size and point.orientation:
         return float(np.sign(point.tangent[-1]) * point.orientation) or np.nan
@@ -149,8 +150,8 @@ def _scaled(points: Sequence[ForcedPoint]) -> FloatArray:
 def cycle_of(problem: ForcedProblem, point: ForcedPoint) -> bytes | None:
     """Return a key of the transitions in the cycle of each contact; None where they are unknown.
 
-    The order of transitions of different contacts does not matter, since no multiplier jumps where it changes. For laws without located
-    transitions, the states at the samples count.
+    The order of transitions of different contacts does not matter, since no multiplier jumps where it changes. For laws
+    without located transitions, the states at the samples count.
     """
     balance = problem.balance(point.support)
     if not isinstance(balance, HarmonicBalance):

@@ -21,9 +21,9 @@ UNIT_TOLERANCE = 1e-6  # distance from 1: far above the rounding of a period, fa
 class Floquet:
     """Multipliers of a periodic motion.
 
-    A multiplier within `UNIT_TOLERANCE` of 1 is neutral and is not judged: it belongs to a family of periodic motions, with
-    different residual tractions of sticking contacts or different positions of free bodies. Other multipliers on the unit
-    circle belong to undamped vibrations, which neither grow nor decay and count as stable.
+    A multiplier within `UNIT_TOLERANCE` of 1 is neutral and is not judged: it belongs to a family of periodic motions,
+    with different residual tractions of sticking contacts or different positions of free bodies. Other multipliers on
+    the unit circle belong to undamped vibrations, which neither grow nor decay and count as stable.
 
     Parameters
     ----------
@@ -74,21 +74,24 @@ class Stability:
     Parameters
     ----------
     floquet
-        Multipliers of the states of structure and moving sliders. `resting` sliders have multipliers of 1, which are left out.
+        Multipliers of the states of structure and moving sliders. `resting` sliders have multipliers of 1, which are
+        left out.
     errors
-        (n_states,) error of each multiplier against the motion with all harmonics: its change with more harmonics and, for laws with
-        sampled tangents, with half the step. Not finite where unknown. The step error is underestimated where friction stops a light
-        mass within a step (measured: by up to a factor of 20) and where planar contacts close into stick (up to 10).
+        (n_states,) error of each multiplier against the motion with all harmonics: its change with more harmonics and,
+        for laws with sampled tangents, with half the step. Not finite where unknown. The step error is underestimated
+        where friction stops a light mass within a step (measured: by up to a factor of 20) and where planar contacts
+        close into stick (up to 10).
     resting
-        Number of tangential springs, planar contacts included, whose sliders rest for the whole period. Each slider is a parameter of the
-        motion, not a state.
+        Number of tangential springs, planar contacts included, whose sliders rest for the whole period. Each slider is
+        a parameter of the motion, not a state.
     grazing
-        Number of these that reached their slip limit once and have rested since; the multipliers are one-sided, of the sticking side.
+        Number of these that reached their slip limit once and have rested since; the multipliers are one-sided, of the
+        sticking side.
     transitions
         Number of transitions located in the period.
     moduli
-        (n_states,) errors of the moduli, which are smaller than the errors of the angles since damping determines the moduli; None:
-        `errors`.
+        (n_states,) errors of the moduli, which are smaller than the errors of the angles since damping determines the
+        moduli; None: `errors`.
     work
         Estimated floating-point operations of the computation.
     """
@@ -110,9 +113,9 @@ class Stability:
     def verdict(self) -> Verdict:
         """Stable, unstable or neutral; undecided if the error of a modulus reaches the unit circle.
 
-        A multiplier above 1 with an error above half its value proves no growth. Multipliers of 1 within rounding belong to families of
-        motions and are not judged. Any other multiplier within `NEUTRAL` of the unit circle, error included, is neutral, such as an
-        undamped vibration or the drift of a slider.
+        A multiplier above 1 with an error above half its value proves no growth. Multipliers of 1 within rounding
+        belong to families of motions and are not judged. Any other multiplier within `NEUTRAL` of the unit circle,
+        error included, is neutral, such as an undamped vibration or the drift of a slider.
         """
         size, errors = self._judged
         if np.any(self._outside):
@@ -224,8 +227,9 @@ def partners(coarse: ComplexArray, fine: ComplexArray) -> ComplexArray:
 def changes(found: ComplexArray, other: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Return the changes of multipliers against a less accurate motion, and the resulting errors of their moduli.
 
-    Damping alone determines the modulus of a complex pair until the pair meets on the real axis. The error is therefore twice the change of
-    the modulus, at least the share `TURNED` of the whole change; where the pair may meet, it is the whole change.
+    Damping alone determines the modulus of a complex pair until the pair meets on the real axis. The error is therefore
+    twice the change of the modulus, at least the share `TURNED` of the whole change; where the pair may meet, it is the
+    whole change.
 
     Parameters
     ----------

@@ -39,9 +39,9 @@ class Corrected:
 def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, float] | None:
     """Return a point after a Newton step with more harmonics, and the ratio of the error to the change by this step.
 
-    The Jacobian Alert predicts errors by the same step. If the step increases the residual, Newton's method continues to a solution with up
-    to `MAX_SOLVED_HARMONICS`, whose change counts `FARTHER` times. The result is the point itself if no force acts on the missing
-    harmonics, and None if no solution is found.
+    The Jacobian Alert predicts errors by the same step. If the step increases the residual, Newton's method continues
+    to a solution with up to `MAX_SOLVED_HARMONICS`, whose change counts `FARTHER` times. The result is the point itself
+    if no force acts on the missing harmonics, and None if no solution is found.
     """
     step = corrected_by_step(problem, point)
     if step is not None:

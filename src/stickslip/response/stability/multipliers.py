@@ -35,8 +35,8 @@ def motion_stability(
 ) -> Stability:
     """Return the stability of a given periodic motion of a structure with contacts.
 
-    Disturbances obey the linear equations of the structure and of the present contact states; the motion enters through the times of the
-    transitions and the rates there.
+    Disturbances obey the linear equations of the structure and of the present contact states; the motion enters through
+    the times of the transitions and the rates there.
 
     Parameters
     ----------
@@ -75,7 +75,8 @@ def stability_in_time(own: InTime, omega: float) -> Stability:
 def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, int] | None:
     """Return the modal states, the monodromy matrix (modal states first) and the number of shares of the period; None if unknown.
 
-    For a travelling wave the matrix covers one share of the period. For laws with sampled tangents it belongs to the finest samples.
+    For a travelling wave the matrix covers one share of the period. For laws with sampled tangents it belongs to the
+    finest samples.
     """
     interface = own.contacts
     modes = _prepared(own.structure, interface, omega)
@@ -147,7 +148,8 @@ def _sampled(
 ) -> Stability:
     """Return the stability with sampled tangents of the contacts `own`, extrapolated from two steps.
 
-    A third step between these protects the error estimate against chance agreement of two steps, which happens with first-order errors.
+    A third step between these protects the error estimate against chance agreement of two steps, which happens with
+    first-order errors.
     """
     laws = [interface.laws[c] for c in own]
     made = [_samples(contacts, own, gap_coefficients, halves) for halves in (2, 3, 4)]

@@ -37,8 +37,8 @@ class Settled:
     stability
         Stability of the motion with more harmonics.
     motion
-        The motion with more harmonics, if the point as solved differs in stability or is another motion; its predicted error is its change
-        from fewer harmonics. Otherwise None.
+        The motion with more harmonics, if the point as solved differs in stability or is another motion; its predicted
+        error is its change from fewer harmonics. Otherwise None.
     """
 
     stability: Stability
@@ -55,12 +55,14 @@ def stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | No
 def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPoint | None = None) -> Settled:
     """Return the stability of a solved point of a forced response.
 
-    The multipliers belong to the motion after a Newton step with more harmonics, since few harmonics give transition times less accurately
-    than amplitudes. Their error is their change by this step times `ROUGHLY`. If the verdict stays open, the motion is solved repeatedly with
-    about twice the harmonics, and the change from one solution to the next is the error.
+    The multipliers belong to the motion after a Newton step with more harmonics, since few harmonics give transition
+    times less accurately than amplitudes. Their error is their change by this step times `ROUGHLY`. If the verdict
+    stays open, the motion is solved repeatedly with about twice the harmonics, and the change from one solution to the
+    next is the error.
 
-    Near a fold, or where contacts bounce, several motions lie within a few percent, and more harmonics may lead to another one. The verdict
-    then belongs to the returned motion. A motion farther away than the threshold of the strategy gives no verdict on the point.
+    Near a fold, or where contacts bounce, several motions lie within a few percent, and more harmonics may lead to
+    another one. The verdict then belongs to the returned motion. A motion farther away than the threshold of the
+    strategy gives no verdict on the point.
 
     Parameters
     ----------
@@ -74,7 +76,8 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
     Raises
     ------
     InputError
-        If the point did not converge, a contact is rigid, or the structure is a sector of a tuned wheel without all its waves.
+        If the point did not converge, a contact is rigid, or the structure is a sector of a tuned wheel without all its
+        waves.
     """
     if not point.converged:
         raise input_error(
@@ -104,8 +107,8 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
     """Return the stability, with its motion if the point as solved differs in stability or lies away; unknown if it lies too far away.
 
-    Near a fold, a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to one of them while
-    more harmonics lead to the other; the verdict then belongs to the motion with more harmonics.
+    Near a fold, a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to
+    one of them while more harmonics lead to the other; the verdict then belongs to the motion with more harmonics.
     """
     if last is first or found.verdict not in ("stable", "unstable"):
         return Settled(found)

@@ -24,8 +24,8 @@ class WaveDisturbance:
     multiplier
         Floquet multiplier: growth in a period.
     wave
-        Wave number with the largest share in the shape. A disturbance of a travelling motion also contains the combinations of this wave
-        with the harmonics of the motion.
+        Wave number with the largest share in the shape. A disturbance of a travelling motion also contains the
+        combinations of this wave with the harmonics of the motion.
     share
         Share of this wave in the squared norm of the shape.
     omega

@@ -1,7 +1,7 @@
 """Map from a state to the state one period later, with its derivative, for `stickslip.response.time.shooting`.
 
-It uses the compiled time step of `integrate`, so that a fixed point of the map is a settled motion of `integrate`, with the
-same step error.
+It uses the compiled time step of `integrate`, so that a fixed point of the map is a settled motion of `integrate`, with
+the same step error.
 """
 
 from dataclasses import dataclass, replace
@@ -87,9 +87,9 @@ class Derivative:
 class PeriodMap:
     """Period map in energy coordinates: modal displacement, velocity, law states.
 
-    A state is ``(ωs q, ωs w, c z)`` with q, w and the speeds s of `ModalCoordinates`, the law states z, and factors c from the contact
-    springs. Half its squared length is the energy of modes and springs, J, so that distances are comparable for stiff and soft
-    coordinates.
+    A state is ``(ωs q, ωs w, c z)`` with q, w and the speeds s of `ModalCoordinates`, the law states z, and factors c
+    from the contact springs. Half its squared length is the energy of modes and springs, J, so that distances are
+    comparable for stiff and soft coordinates.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ class PeriodMap:
     scale
         (size,) factors of (q, w, z).
     shares
-        Number n of sectors of a travelling motion, in which each sector moves like another one T/n earlier: the map then covers T/n,
-        followed by a shift of the sectors. Otherwise 1.
+        Number n of sectors of a travelling motion, in which each sector moves like another one T/n earlier: the map
+        then covers T/n, followed by a shift of the sectors. Otherwise 1.
     shift
         (size, size) shift of the sectors; None without one.
     """

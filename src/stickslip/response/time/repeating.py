@@ -1,9 +1,10 @@
 """Test whether a motion in time is periodic, by its change from period to period and the growth of small differences.
 
-The motion is integrated from rest until the harmonics of all gaps repeat or the periods run out. If it does not repeat, a copy with a perturbation of
-a millionth is integrated beside it: a growing difference excludes a slow decay. Without growth, the changes must keep their size for so long that free
-motions of the structure would have decayed. Every negative verdict is checked with half the step, and again while half the step changes the motion: too
-long a step during impacts also prevents repetition.
+The motion is integrated from rest until the harmonics of all gaps repeat or the periods run out. If it does not repeat,
+a copy with a perturbation of a millionth is integrated beside it: a growing difference excludes a slow decay. Without
+growth, the changes must keep their size for so long that free motions of the structure would have decayed. Every
+negative verdict is checked with half the step, and again while half the step changes the motion: too long a step during
+impacts also prevents repetition.
 """
 
 from collections.abc import Sequence
@@ -61,7 +62,8 @@ class Repetition:
     steps, angle
         Steps in a period, and phase angle per step of the fastest contact that opens or closes, rad.
     kept
-        Decay factor per period of the slowest motion of the structure with all contacts stuck; NaN where it was not computed.
+        Decay factor per period of the slowest motion of the structure with all contacts stuck; NaN where it was not
+        computed.
     finer
         Result with half the step; None where the motion repeats after one period.
     """
@@ -229,8 +231,8 @@ def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: Flo
 def _repeats(gaps: Sequence[ComplexArray]) -> int:
     """Return the number of periods after which a motion repeats; 0: it does not.
 
-    Several periods count only if the change from one to the next persists. In a decaying subharmonic motion, the change over two periods is also smaller
-    than over one, but both decay.
+    Several periods count only if the change from one to the next persists. In a decaying subharmonic motion, the change
+    over two periods is also smaller than over one, but both decay.
     """
     single = float(_changes(gaps[-5:], 1).max())
     if single < REPEATS:
@@ -251,7 +253,8 @@ def _repeats(gaps: Sequence[ComplexArray]) -> int:
 def _growth(marcher: Marcher, state: StepState) -> float:
     """Return the growth factor per period of the distance of a perturbed copy while it is small.
 
-    The largest distances in each half of the periods are compared, since a distance may oscillate between displacement and speed.
+    The largest distances in each half of the periods are compared, since a distance may oscillate between displacement
+    and speed.
     """
     n, record = marcher.n, marcher.record()
     own, other = (StepState(state.x.copy(), state.seen.copy(), state.law.copy(), state.status.copy()) for _ in range(2))

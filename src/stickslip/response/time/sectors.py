@@ -1,9 +1,10 @@
 """All sectors of a tuned wheel in time: each sector is integrated, since waves belong to harmonics.
 
-The coordinates and gaps of a tuned wheel have the same meaning in every wave. The motion of sector s is the sum of its waves,
-``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are discrete Fourier transforms of the waves' matrices. If the
-engine order m and the number of sectors n_s have the greatest common divisor g, the motion repeats after n_s/g sectors, which represent
-all. Aerodynamic forces enter in their frozen form, with real matrices for the whole wheel.
+The coordinates and gaps of a tuned wheel have the same meaning in every wave. The motion of sector s is the sum of its
+waves, ``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are discrete Fourier transforms of the
+waves' matrices. If the engine order m and the number of sectors n_s have the greatest common divisor g, the motion
+repeats after n_s/g sectors, which represent all. Aerodynamic forces enter in their frozen form, with real matrices for
+the whole wheel.
 """
 
 from collections.abc import Mapping
@@ -102,13 +103,14 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     load
         Loads on the coordinates of its harmonics.
     every
-        Whether to include all sectors, with independent motions, and not only the distinct ones under the engine order. The wheel then
-        needs all its waves (`TunedWheel.has_every_wave`).
+        Whether to include all sectors, with independent motions, and not only the distinct ones under the engine order.
+        The wheel then needs all its waves (`TunedWheel.has_every_wave`).
 
     Raises
     ------
     InputError
-        If waves are missing, their matrices allow no equations in time, or the load drives a wave that travels against another one.
+        If waves are missing, their matrices allow no equations in time, or the load drives a wave that travels against
+        another one.
     """
     wheel, interface = system.structure.wheel, system.interface
     if wheel is None:

@@ -48,9 +48,9 @@ class ShootingResult:
     Parameters
     ----------
     status
-        ``converged``; ``coarse``: periodic, but the estimated step error of the harmonics is above 1 %; ``not converged``: the periods ran
-        out, or plain periods settled but the corrections from there did not, or there is no periodic motion nearby (a drift);
-        ``diverged``: the motion overflowed, and all arrays are NaN.
+        ``converged``; ``coarse``: periodic, but the estimated step error of the harmonics is above 1 %; ``not
+        converged``: the periods ran out, or plain periods settled but the corrections from there did not, or there is
+        no periodic motion nearby (a drift); ``diverged``: the motion overflowed, and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes, m.
     floquet
@@ -64,11 +64,12 @@ class ShootingResult:
     distance
         Length of the last correction, relative to the vibration of the orbit.
     step_error
-        Estimated step error of the harmonics, relative to the largest, from twice as many steps, and four times as many where a contact
-        opens or closes. NaN without a motion.
+        Estimated step error of the harmonics, relative to the largest, from twice as many steps, and four times as many
+        where a contact opens or closes. NaN without a motion.
     growth_error
-        Estimated step error of the multipliers' largest modulus, where it is within 0.05 of 1 or a contact opens or closes. Infinite where
-        a slider reverses within a step, which the multipliers miss, or where openings make the motion coarse; 0 elsewhere.
+        Estimated step error of the multipliers' largest modulus, where it is within 0.05 of 1 or a contact opens or
+        closes. Infinite where a slider reverses within a step, which the multipliers miss, or where openings make the
+        motion coarse; 0 elsewhere.
     contact_failures
         Time steps of the last period in which the contact equations were not solved to rounding.
     final
@@ -139,12 +140,13 @@ def shoot(  # noqa: PLR0913
 ) -> ShootingResult:
     """Find a periodic motion of ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` with the period of the load.
 
-    Newton's method solves ``P(z) = z`` for the state z at t = 0, where P is one period with the time step of `integrate`.
-    Contacts that stick for the whole period allow a family of motions, one for each position of their sliders: the sliders
-    keep their positions after the first periods. If the derivative of ``P(z) - z`` is singular otherwise, as for a free body,
-    the shortest correction is taken. The search begins with plain periods. A correction that leads away from the orbit is
-    shortened; if this does not help, plain periods replace it. If forty corrections do not converge, the motion is integrated
-    from the start in ever longer blocks with a short search after each, until it settles or the periods run out.
+    Newton's method solves ``P(z) = z`` for the state z at t = 0, where P is one period with the time step of
+    `integrate`. Contacts that stick for the whole period allow a family of motions, one for each position of their
+    sliders: the sliders keep their positions after the first periods. If the derivative of ``P(z) - z`` is singular
+    otherwise, as for a free body, the shortest correction is taken. The search begins with plain periods. A correction
+    that leads away from the orbit is shortened; if this does not help, plain periods replace it. If forty corrections
+    do not converge, the motion is integrated from the start in ever longer blocks with a short search after each, until
+    it settles or the periods run out.
 
     Parameters
     ----------
@@ -153,13 +155,13 @@ def shoot(  # noqa: PLR0913
     start
         State at t = 0, preferably from a harmonic balance (`start_from_harmonics`); rest if None.
     stepping
-        Steps in a period, largest number of periods, number of harmonics; `tolerance` bounds the length of the last correction
-        relative to the vibration. If None, 1024 steps and 1e-9.
+        Steps in a period, largest number of periods, number of harmonics; `tolerance` bounds the length of the last
+        correction relative to the vibration. If None, 1024 steps and 1e-9.
     weights
         (n_contacts,) factors of the contact forces; None: ones.
     symmetry
-        Symmetry of all sectors of a tuned wheel (`SectorsInTime.motion`): the map then covers the share of the period after which each
-        sector has the initial state of another. Only motions that travel with the load are found.
+        Symmetry of all sectors of a tuned wheel (`SectorsInTime.motion`): the map then covers the share of the period
+        after which each sector has the initial state of another. Only motions that travel with the load are found.
 
     Raises
     ------
@@ -203,7 +205,8 @@ def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, correct
 def _march_and_search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, warm: FloatArray) -> None:
     """Integrate from `warm` in blocks, each twice as long as the last, with a new search after each.
 
-    The integration ignores the states of failed searches, so that it reaches every orbit that `integrate` reaches, in as many periods.
+    The integration ignores the states of failed searches, so that it reaches every orbit that `integrate` reaches, in
+    as many periods.
     """
     changes: list[float] = []
     block, settled = FALLBACK, False
@@ -346,8 +349,8 @@ class StepErrors:
     motion
         Error of the outputs' harmonics, relative to the largest; infinite if finer steps overflow.
     growth
-        Error of the multipliers' largest modulus, where it is close to 1 or a contact opens or closes; infinite where a slider reverses
-        within a step, which derivatives miss; 0 elsewhere.
+        Error of the multipliers' largest modulus, where it is close to 1 or a contact opens or closes; infinite where a
+        slider reverses within a step, which derivatives miss; 0 elsewhere.
     """
 
     motion: float
@@ -419,7 +422,8 @@ def _corrected(
 def _scattered(first: float, second: float, least: float) -> float:
     """Return the error of the first of three values from their two changes, which are partly random; infinite if a change is unknown.
 
-    Further changes are taken as a geometric series with the ratio of the two; `least` is the lower bound of its sum over the first change.
+    Further changes are taken as a geometric series with the ratio of the two; `least` is the lower bound of its sum
+    over the first change.
     """
     if not np.isfinite(first + second):
         return np.inf

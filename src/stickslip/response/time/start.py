@@ -32,8 +32,8 @@ class TransientStart:
     displacement, velocity
         (n,) in m and m/s.
     states
-        One array (n_state,) for each contact: the state of its law, as in the law's `initial_state`. An entry that is NaN there may
-        be NaN here: the law then determines it at t = 0.
+        One array (n_state,) for each contact: the state of its law, as in the law's `initial_state`. An entry that is
+        NaN there may be NaN here: the law then determines it at t = 0.
     """
 
     displacement: FloatArray
@@ -52,8 +52,8 @@ def start_from_harmonics(
 ) -> TransientStart:
     """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as a solution of a harmonic balance.
 
-    The laws are evaluated along the gaps until their states repeat. For a `point` of a forced response `problem`, the amplitudes of
-    all dofs are ``problem.low.linear.recover(point.omega, point.coefficients)``.
+    The laws are evaluated along the gaps until their states repeat. For a `point` of a forced response `problem`, the
+    amplitudes of all dofs are ``problem.low.linear.recover(point.omega, point.coefficients)``.
 
     Parameters
     ----------

@@ -1,11 +1,12 @@
 """Direct time integration; it shares only the matrices and the contact laws with the harmonic balance.
 
-A matrix exponential propagates the linear structure with all contacts stuck, and the periodic loads, exactly over a step, for any
-damping matrix and any stiffness. The remaining contact force, minus the force of the stuck springs, is interpolated linearly over
-the step (first-order hold) and solved implicitly. Sticking contacts are thus integrated without error. For slipping and open contacts,
-the linear interpolation of a curved force reduces the mass on the spring by about ``k h²/12``; changes of state add another error of
-second order in the step. Contact springs that vibrate much faster than the load with their effective mass are therefore no part of the
-linear structure: their force is the mean of both ends of the step, which conserves energy.
+A matrix exponential propagates the linear structure with all contacts stuck, and the periodic loads, exactly over a
+step, for any damping matrix and any stiffness. The remaining contact force, minus the force of the stuck springs, is
+interpolated linearly over the step (first-order hold) and solved implicitly. Sticking contacts are thus integrated
+without error. For slipping and open contacts, the linear interpolation of a curved force reduces the mass on the spring
+by about ``k h²/12``; changes of state add another error of second order in the step. Contact springs that vibrate much
+faster than the load with their effective mass are therefore no part of the linear structure: their force is the mean of
+both ends of the step, which conserves energy.
 """
 
 from collections.abc import Sequence
@@ -36,20 +37,20 @@ class TimeStepping:
     Parameters
     ----------
     steps_per_period
-        Steps in a period of the excitation. An impact on a stiff spring needs several steps; where a sliding contact reverses within a
-        step, the error is of first order.
+        Steps in a period of the excitation. An impact on a stiff spring needs several steps; where a sliding contact
+        reverses within a step, the error is of first order.
     max_periods
         Largest number of periods.
     tolerance
-        The driven harmonics (without a load: the first) are settled when their estimated remaining change, relative to the largest
-        amplitude, is below this.
+        The driven harmonics (without a load: the first) are settled when their estimated remaining change, relative to
+        the largest amplitude, is below this.
     harmonics
         Highest harmonic reported.
     min_periods
         Smallest number of periods, also for a settled motion: a disturbance may need them to grow.
     every_harmonic
-        Judge all reported harmonics except the mean, not the driven ones only: a motion over several periods of the load shows in the
-        others.
+        Judge all reported harmonics except the mean, not the driven ones only: a motion over several periods of the
+        load shows in the others.
     """
 
     steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
@@ -73,13 +74,13 @@ class TransientResult:
     Parameters
     ----------
     status
-        ``settled``: the driven harmonics have become periodic; ``unsettled``: the periods ran out; ``diverged``: the motion overflowed,
-        and all arrays are NaN.
+        ``settled``: the driven harmonics have become periodic; ``unsettled``: the periods ran out; ``diverged``: the
+        motion overflowed, and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes over the last period, m.
     average
-        (n_outputs,) first harmonic averaged over the last third of the periods, m: the value to use if undamped modes of a damper on its
-        contact springs keep vibrating and nothing settles.
+        (n_outputs,) first harmonic averaged over the last third of the periods, m: the value to use if undamped modes
+        of a damper on its contact springs keep vibrating and nothing settles.
     averages
         (n_h + 1, n_outputs) averages of all harmonics, m.
     scatter
@@ -91,8 +92,8 @@ class TransientResult:
     remaining
         Sum of all future changes if they decay at the same rate (see `stickslip.response.time.settling`).
     decay
-        Largest change in the last third of the periods over the third before: 1 for persistent vibration, more for growing motion. NaN if
-        there are too few periods.
+        Largest change in the last third of the periods over the third before: 1 for persistent vibration, more for
+        growing motion. NaN if there are too few periods.
     contact_failures
         Time steps in which the contact equations were not solved to rounding.
     drift
@@ -108,8 +109,8 @@ class TransientResult:
     gap, contact_force
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     step_angle
-        Phase angle per step, rad, of the fastest contact that opens or closes in the last period: frequency of its stiffness and
-        effective mass, times the step. See `stickslip.response.time.stepping.marcher`.
+        Phase angle per step, rad, of the fastest contact that opens or closes in the last period: frequency of its
+        stiffness and effective mass, times the step. See `stickslip.response.time.stepping.marcher`.
     """
 
     status: SettlingStatus
@@ -166,7 +167,8 @@ def integrate(  # noqa: PLR0913
     Parameters
     ----------
     structure
-        Any linear structure with a regular mass matrix; free rigid bodies are allowed. For a wheel, the structure of all sectors.
+        Any linear structure with a regular mass matrix; free rigid bodies are allowed. For a wheel, the structure of
+        all sectors.
     gap_operator
         (3 n_contacts, n), dense or sparse: rows t, w, n of each contact; normal gap positive when open.
     laws

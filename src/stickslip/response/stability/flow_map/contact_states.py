@@ -1,8 +1,9 @@
 """Piecewise-linear contacts in a disturbed motion: stiffness between transitions, and jumps at transitions.
 
-A sticking tangential spring of stiffness ``k`` connects the structure to its slider. A slipping spring exerts ``±μ`` times the normal force, an
-open one no force. Forces are continuous at every transition, so disturbances of the structure do not jump. Only slider positions jump: slip
-and lift-off erase them, and the beginning of stick sets them again.
+A sticking tangential spring of stiffness ``k`` connects the structure to its slider. A slipping spring exerts ``±μ``
+times the normal force, an open one no force. Forces are continuous at every transition, so disturbances of the
+structure do not jump. Only slider positions jump: slip and lift-off erase them, and the beginning of stick sets them
+again.
 """
 
 from dataclasses import dataclass
@@ -40,7 +41,8 @@ class ContactStates:
     takes_hold
         (n_intervals, n_sliders) whether stick begins with the interval.
     by_normal
-        (n_intervals, n_sliders) derivative of the slider position by the normal gap where stick begins; the derivative by its own gap is one.
+        (n_intervals, n_sliders) derivative of the slider position by the normal gap where stick begins; the derivative
+        by its own gap is one.
     resting
         Number of sliders that stick for the whole period; they are parameters of the motion, not states.
     grazing

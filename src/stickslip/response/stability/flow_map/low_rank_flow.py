@@ -1,14 +1,16 @@
 """Propagation of disturbances over the intervals of a period whose contact states differ in a few springs.
 
-The base state, in which each contact stays longest, is decomposed into eigenvectors; its exponential is then diagonal. Another state
-differs by a matrix of rank r, the number of differing springs: ``A = A₀ + U V``. The difference of the exponentials is an integral of the
-difference of the resolvents along a hyperbola around the eigenvalues (Weideman & Trefethen 2007),
+The base state, in which each contact stays longest, is decomposed into eigenvectors; its exponential is then diagonal.
+Another state differs by a matrix of rank r, the number of differing springs: ``A = A₀ + U V``. The difference of the
+exponentials is an integral of the difference of the resolvents along a hyperbola around the eigenvalues (Weideman &
+Trefethen 2007),
 
     exp(hA) - exp(hA₀) = 1/(2πi) ∫ exp(zh) R U (1 - V R U)⁻¹ V R dz,    R = (z - A₀)⁻¹,
 
-which the trapezoidal rule turns into a product of two thin matrices. Overdamped modes lie far inside the hyperbola and need no halving of
-the interval; the exponential of a full matrix needs five halvings or more. As a check, the integral is repeated for one vector with other
-nodes. If the results differ, the interval is halved; if they still differ after some halvings, the full matrix is used.
+which the trapezoidal rule turns into a product of two thin matrices. Overdamped modes lie far inside the hyperbola and
+need no halving of the interval; the exponential of a full matrix needs five halvings or more. As a check, the integral
+is repeated for one vector with other nodes. If the results differ, the interval is halved; if they still differ after
+some halvings, the full matrix is used.
 """
 
 from typing import Protocol

@@ -15,8 +15,8 @@ from stickslip.model.structure import Structure
 class ModalStates:
     """Modal states (p, w) with ``u = basis p``, ``u̇ = ω basis (speed w)``, in the time τ = ωt.
 
-    The basis consists of the mass-normalised modes with all contacts stuck; slip and lift-off reduce the stiffness. `speed` scales both halves
-    of a state to similar size.
+    The basis consists of the mass-normalised modes with all contacts stuck; slip and lift-off reduce the stiffness.
+    `speed` scales both halves of a state to similar size.
     """
 
     omega: float

@@ -1,10 +1,11 @@
 """Monodromy matrix: matrix exponentials between located transitions, projections at transitions, impulses of sampled tangents.
 
-Laws without located transitions act by an impulse at each sample, with exact propagation between samples (the splitting of Strang 1968); the
-error is of second order in the step. The means of their tangents over the period are springs of the propagated structure.
+Laws without located transitions act by an impulse at each sample, with exact propagation between samples (the splitting
+of Strang 1968); the error is of second order in the step. The means of their tangents over the period are springs of
+the propagated structure.
 
-Within a block of samples, small matrices give the gaps from the initial states and from the forces at earlier samples; large matrices are
-multiplied once per block. The result agrees with single samples up to rounding.
+Within a block of samples, small matrices give the gaps from the initial states and from the forces at earlier samples;
+large matrices are multiplied once per block. The result agrees with single samples up to rounding.
 """
 
 from dataclasses import dataclass
@@ -54,8 +55,8 @@ class Sliders:
 def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
     """Return the monodromy matrix of contacts with located transitions only.
 
-    The states belong to the structure and to sliders that stick at the beginning of the period. The period begins at the transition after
-    which the fewest sliders stick; the non-zero multipliers do not depend on this choice.
+    The states belong to the structure and to sliders that stick at the beginning of the period. The period begins at
+    the transition after which the fewest sliders stick; the non-zero multipliers do not depend on this choice.
     """
     flow, count = flow_of(modes, contacts), len(contacts.times) - 1
     places = Sliders(flow.gaps, contacts)
@@ -74,8 +75,8 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
 def share_of_monodromy(modes: ModalStates, contacts: ContactStates, wheel: InTime) -> FloatArray | None:
     """Return the monodromy matrix of one share of the period with renumbered sectors; None if the motion has no shares.
 
-    A travelling wave repeats its first share of the period in other sectors, so the multipliers of the period are powers of the multipliers
-    of the share. The share begins in the middle of the longest interval.
+    A travelling wave repeats its first share of the period in other sectors, so the multipliers of the period are
+    powers of the multipliers of the share. The share begins in the middle of the longest interval.
     """
     times, count = contacts.times, len(contacts.times) - 1
     sliders = contacts.rows.size
@@ -344,10 +345,11 @@ def _kick(jac, weight, springs, share, known, states, forces):  # type: ignore[n
 def _run(contacts, shares, gap_response, gaps, states, before, known, forces):  # type: ignore[no-untyped-def]
     """Apply the contact impulses at each sample of a block.
 
-    `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and previous gaps, the factors (n,) of the forces,
-    and the springs (3 n,) in the propagation; `shares` (samples,) are step lengths over the period. Changed in place are `gaps` (samples, 3 n, k), to which
-    the effect of the block's forces is added, `states` (n, s, k) and `before` (n, 3, k); `forces` (samples, 3 n, k) is filled; `known` (6 + s, k) is a
-    work array.
+    `contacts` are the derivatives (samples, n, 3 + s, 6 + s) of forces and new states by gaps, states and previous
+    gaps, the factors (n,) of the forces, and the springs (3 n,) in the propagation; `shares` (samples,) are step
+    lengths over the period. Changed in place are `gaps` (samples, 3 n, k), to which the effect of the block's forces is
+    added, `states` (n, s, k) and `before` (n, 3, k); `forces` (samples, 3 n, k) is filled; `known` (6 + s, k) is a work
+    array.
     """
     jac, weights, springs = contacts
     kept = states.shape[1]

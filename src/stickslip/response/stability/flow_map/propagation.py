@@ -1,8 +1,8 @@
 """Propagation of disturbances between transitions: matrix exponential to rounding accuracy.
 
-Reduced structures are stiff: their fastest modes vibrate a thousand times in a period. In short intervals, the Taylor series of the
-exponential acts on the disturbances. Longer intervals are halved until a rational approximation is exact to rounding, which is then squared
-(Higham 2005). Additional columns contain the constant force of sticking sliders.
+Reduced structures are stiff: their fastest modes vibrate a thousand times in a period. In short intervals, the Taylor
+series of the exponential acts on the disturbances. Longer intervals are halved until a rational approximation is exact
+to rounding, which is then squared (Higham 2005). Additional columns contain the constant force of sticking sliders.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Tangents of contact laws without located transitions, at samples of a period.
 
-Hysteresis reverses where a gap reverses. A step across a reversal is divided there, with an interpolated gap, since both sides have different
-slopes. Velocity-dependent friction is steep where the velocity passes zero; its tangents are integrated adaptively over the steps on both
-sides of a sample.
+Hysteresis reverses where a gap reverses. A step across a reversal is divided there, with an interpolated gap, since
+both sides have different slopes. Velocity-dependent friction is steep where the velocity passes zero; its tangents are
+integrated adaptively over the steps on both sides of a sample.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,7 +40,8 @@ class SampledTangents:
     jac
         (samples, n, 3 + s, 9 + s).
     resting, grazing
-        (n,) number of sliders that stick for the whole period, and number of these that have moved from their initial position.
+        (n,) number of sliders that stick for the whole period, and number of these that have moved from their initial
+        position.
     """
 
     contacts: IntArray
@@ -223,7 +224,8 @@ def _hat_integrals(
 ) -> FloatArray:
     """Return means of tangents about each sample, with a weight that decreases linearly to zero at the neighbouring samples.
 
-    A force much shorter than a step becomes two impulses with the same sum and mean time. Parts are halved until Simpson's rule converges.
+    A force much shorter than a step becomes two impulses with the same sum and mean time. Parts are halved until
+    Simpson's rule converges.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Contact forces under a disturbance ``e^{στ} Σ_h G_h e^{ihτ}`` of the gaps, along a motion with known transitions.
 
-The forces are ``e^{στ} Σ_h F_h e^{ihτ}``. The matrix from G to F depends on the exponent σ: a slider that sticks from τ_0 on keeps the
-displacement of the disturbance at τ_0 while the disturbance grows. The Jacobian of the harmonic balance uses the matrix at σ = 0, which
-gives wrong exponents elsewhere.
+The forces are ``e^{στ} Σ_h F_h e^{ihτ}``. The matrix from G to F depends on the exponent σ: a slider that sticks from
+τ_0 on keeps the displacement of the disturbance at τ_0 while the disturbance grows. The Jacobian of the harmonic
+balance uses the matrix at σ = 0, which gives wrong exponents elsewhere.
 """
 
 from dataclasses import dataclass, field
@@ -50,7 +50,8 @@ class ContactTangent:
     ports
         (m,) indices, among the ports of all contacts, at which the contact differs from the mean springs at any time.
     times
-        (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same transition a period later.
+        (n_intervals + 1,) ends of the intervals, from one transition of any contact to the same transition a period
+        later.
     changes
         (n_intervals, m, m) stiffness in each interval minus the mean springs, N/m, with fixed sticking sliders.
     rests

@@ -55,8 +55,8 @@ class HillStability:
     disturbance
         Disturbance of the deciding multiplier; None without a multiplier near the unit circle.
     missing
-        Number of multipliers outside the unit circle that were counted by the winding of the determinant but not found; None if they could
-        not be counted.
+        Number of multipliers outside the unit circle that were counted by the winding of the determinant but not found;
+        None if they could not be counted.
     """
 
     stability: Stability
@@ -82,8 +82,8 @@ class HillStability:
 def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept) -> HillStability:
     """Return the stability of a solved point of a forced response; for a tuned wheel, against disturbances of every wave.
 
-    As in `stability`, the multipliers belong to the motion with more harmonics, and their change is part of the errors. Structural damping
-    and frequency-dependent aerodynamic coefficients act as in the balance.
+    As in `stability`, the multipliers belong to the motion with more harmonics, and their change is part of the errors.
+    Structural damping and frequency-dependent aerodynamic coefficients act as in the balance.
 
     Parameters
     ----------
@@ -152,13 +152,14 @@ def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int 
     omega
         Frequency of the motion, rad/s.
     order
-        Highest solved harmonic of the disturbances; higher ones act to first order. None: chosen from the harmonics of the motion.
+        Highest solved harmonic of the disturbances; higher ones act to first order. None: chosen from the harmonics of
+        the motion.
 
     Raises
     ------
     InputError
-        If a contact is rigid, a law's transitions are not located, rounding makes more transitions than possible, or a tuned wheel lacks
-        waves.
+        If a contact is rigid, a law's transitions are not located, rounding makes more transitions than possible, or a
+        tuned wheel lacks waves.
     """
     hill, _ = _prepared(system, gaps, omega, order)
     if hill is None:

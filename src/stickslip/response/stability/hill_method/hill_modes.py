@@ -1,7 +1,7 @@
 """Modes of the dynamic stiffness of each harmonic, for a disturbance with a complex exponent.
 
-The modes are computed with mean springs in place of the contacts. Viscous damping may couple them; loss factors and aerodynamic forces act
-as in the harmonic balance.
+The modes are computed with mean springs in place of the contacts. Viscous damping may couple them; loss factors and
+aerodynamic forces act as in the harmonic balance.
 """
 
 from dataclasses import dataclass, replace
@@ -29,10 +29,11 @@ class HillModes:
     stiffness, mass
         (n,) of each mode; the mass times ω².
     damping, rest, loss
-        (n, n) damping times ω, non-Hermitian part of the stiffness, and hysteretic stiffness with a phase lead of a quarter period; all
-        (n,) if only `springs` couple the modes.
+        (n, n) damping times ω, non-Hermitian part of the stiffness, and hysteretic stiffness with a phase lead of a
+        quarter period; all (n,) if only `springs` couple the modes.
     springs
-        (r, n) factor of the damping ``-springsᴴ springs`` times ω, for stiffness-proportional damping without the mean springs.
+        (r, n) factor of the damping ``-springsᴴ springs`` times ω, for stiffness-proportional damping without the mean
+        springs.
     ports
         (m, n) gaps at the ports of the contacts.
     omega

@@ -1,9 +1,9 @@
 """Hill's problem in a frequency interval of the disturbance, as a small matrix of the modes that resonate there.
 
-A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h q_h`` and contact forces
-``f = D(σ) g``. Modes far from resonance are eliminated with the contacts. The matrix S(σ) of the remaining modes has no poles near the segment, so a
-polynomial through a few σ is accurate to many digits. Contact harmonics above the solved ones act to first order, ``-D R D`` with the receptance R at
-the ports.
+A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h
+q_h`` and contact forces ``f = D(σ) g``. Modes far from resonance are eliminated with the contacts. The matrix S(σ) of
+the remaining modes has no poles near the segment, so a polynomial through a few σ is accurate to many digits. Contact
+harmonics above the solved ones act to first order, ``-D R D`` with the receptance R at the ports.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -41,8 +41,9 @@ def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
 def _top(modes: HillModes, tangents: Sequence[ContactTangent]) -> float:
     """Return `reach` for one wave.
 
-    At a sudden change of stiffness, the amplitude of a fast mode grows at most, at the worst phase, by the square root of the ratio of its
-    frequencies before and after; between changes it decays by damping. A mode with a negative total logarithm over the period cannot grow.
+    At a sudden change of stiffness, the amplitude of a fast mode grows at most, at the worst phase, by the square root
+    of the ratio of its frequencies before and after; between changes it decays by damping. A mode with a negative total
+    logarithm over the period cannot grow.
     """
     share = _relative(modes, tangents)
     own = np.log(np.maximum(1.0 + share, LET_GO))

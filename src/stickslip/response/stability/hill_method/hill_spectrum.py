@@ -37,8 +37,8 @@ class Exponents:
     waves, harmonics
         (e,) wave number and strongest harmonic of each disturbance.
     missing
-        Number of exponents right of the imaginary axis that were not found; None if they could not be counted. Unless it is 0, only the
-        fastest growing exponent that more harmonics confirm is kept right of the axis.
+        Number of exponents right of the imaginary axis that were not found; None if they could not be counted. Unless
+        it is 0, only the fastest growing exponent that more harmonics confirm is kept right of the axis.
     """
 
     values: ComplexArray
@@ -70,7 +70,8 @@ class Part:
 def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
     """Return all exponents of a motion near the imaginary axis and right of it, or those near some segments.
 
-    For a wheel each wave is a separate problem. Disturbances are real, so the exponents of waves k and -k are conjugate.
+    For a wheel each wave is a separate problem. Disturbances are real, so the exponents of waves k and -k are
+    conjugate.
     """
     if segments:
         return _gathered([_zeros(fitted(segment)) for segment in segments], hill, None)
@@ -154,7 +155,8 @@ def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
 def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
     """Return the exponents near a segment, their errors, and their strongest harmonics.
 
-    Far from the segment the polynomial has spurious zeros, so zeros right of the segment are solved again with the exact matrix.
+    Far from the segment the polynomial has spurious zeros, so zeros right of the segment are solved again with the
+    exact matrix.
     """
     found = _raw(segment, "whole") if zeros is None else zeros
     beside = found.values.real - segment.growth

@@ -1,6 +1,7 @@
 """Zeros of an analytic determinant: found by contour integrals, refined by Newton's method, and counted.
 
-W.-J. Beyn, "An integral method for solving nonlinear eigenvalue problems", Linear Algebra and its Applications 436 (2012) 3839-3863.
+W.-J. Beyn, "An integral method for solving nonlinear eigenvalue problems", Linear Algebra and its Applications 436
+(2012) 3839-3863.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,9 @@
 """Evaluation of any contact law over one time step: force, new state and their derivatives for a given gap at the end.
 
-A law forgets its state at lift-off, and after closure its friction refers to the gap at closure. A reference to the previous sample would cause an
-error of first order in the force for as long as the contact sticks. A step with a closure is therefore evaluated in two parts: up to the point of the
-straight gap path where the normal force begins, and from there to the end.
+A law forgets its state at lift-off, and after closure its friction refers to the gap at closure. A reference to the
+previous sample would cause an error of first order in the force for as long as the contact sticks. A step with a
+closure is therefore evaluated in two parts: up to the point of the straight gap path where the normal force begins, and
+from there to the end.
 """
 
 from collections.abc import Sequence
@@ -75,8 +76,8 @@ def _way(c, state, work, jac):  # type: ignore[no-untyped-def]
 def _chain(jac, there, entry, way, normal, share):  # type: ignore[no-untyped-def]
     """Convert derivatives by the state at closure into derivatives by gap, rate and state before the step.
 
-    The point of closure changes with the path. The component of this change along the path is removed, since the time of closure
-    changes, too.
+    The point of closure changes with the path. The component of this change along the path is removed, since the time
+    of closure changes, too.
     """
     n_state, along = there.shape[0] - 3, 0.0
     for d in range(3):

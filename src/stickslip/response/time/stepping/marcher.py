@@ -1,8 +1,9 @@
 """Structure with contacts, prepared for time integration with a step that resolves impacts.
 
-A contact of stiffness k vibrates with its effective mass m at √(k/m), and an impact lasts half a period of this vibration. The accuracy with a step h
-depends on the angle ``√(k/m) h``. For masses on stops, the error against an integrator with exact events (`tests/test_step_choice.py`) is below 1 % for
-angles up to `FINE`, and below 2 % up to `ROUGH`. Contacts that stay closed, and contacts that slip, need no fine steps.
+A contact of stiffness k vibrates with its effective mass m at √(k/m), and an impact lasts half a period of this
+vibration. The accuracy with a step h depends on the angle ``√(k/m) h``. For masses on stops, the error against an
+integrator with exact events (`tests/test_step_choice.py`) is below 1 % for angles up to `FINE`, and below 2 % up to
+`ROUGH`. Contacts that stay closed, and contacts that slip, need no fine steps.
 """
 
 from collections.abc import Callable, Sequence

@@ -170,8 +170,9 @@ def _step_exponential(
 ) -> FloatArray:
     """Return the rows of the motion in the exponential of one block matrix with all parts of a step.
 
-    The columns belong to the motion, the contact force at the beginning of the step, its increase over the step (linear in time), and the
-    clock ``(1, cos hτ, sin hτ, ...)`` of the loads. No stiffness is inverted, so free rigid bodies are allowed.
+    The columns belong to the motion, the contact force at the beginning of the step, its increase over the step (linear
+    in time), and the clock ``(1, cos hτ, sin hτ, ...)`` of the loads. No stiffness is inverted, so free rigid bodies
+    are allowed.
     """
     m, n, k = len(motion), len(motion) // 2, len(gaps)
     orders = sorted(load.harmonics)

@@ -1,7 +1,7 @@
 """Newton matrix of a time step: derivatives of the contact forces, LU factors and steps; compiled, without allocations.
 
-In a step, only few of many contacts change their state. The LU is then kept, and the Woodbury formula corrects changed rows, until they
-are a quarter of all rows.
+In a step, only few of many contacts change their state. The LU is then kept, and the Woodbury formula corrects changed
+rows, until they are a quarter of all rows.
 """
 
 # mypy: disallow-untyped-decorators=False

@@ -1,7 +1,7 @@
 """Derivative of a sequence of time steps, for `stickslip.response.time.shooting`.
 
-The tangent of a state has one column for each initial direction. The logged derivatives of the laws propagate it; successive steps with
-the same derivatives are combined by squaring their common matrix.
+The tangent of a state has one column for each initial direction. The logged derivatives of the laws propagate it;
+successive steps with the same derivatives are combined by squaring their common matrix.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,8 @@
 """Compiled time step of `stickslip.response.time.transient`, for contacts of any law.
 
-The linear structure with all contacts stuck is propagated exactly. The contact force minus the force of the stuck springs, r, is linear
-within the step, and its value at the end is the unknown: it must agree with the laws at the resulting gaps and rates. For a sticking
-contact, r does not depend on the gap.
+The linear structure with all contacts stuck is propagated exactly. The contact force minus the force of the stuck
+springs, r, is linear within the step, and its value at the end is the unknown: it must agree with the laws at the
+resulting gaps and rates. For a sticking contact, r does not depend on the gap.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -148,7 +148,8 @@ def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
 def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-untyped-def]
     """Solve for r at the end of a step by a semi-smooth Newton method; return whether it converged to rounding.
 
-    For piecewise-linear laws, a step without a change of state is exact. Without `solves`, only evaluate the laws at the given gaps and rates.
+    For piecewise-linear laws, a step without a change of state is exact. Without `solves`, only evaluate the laws at
+    the given gaps and rates.
     """
     for iteration in range(-1, NEWTON_STEPS):
         if iteration == FULL_STEPS:
