@@ -218,7 +218,10 @@ def _largest(flanks: tuple[Flank, ...], k: int, pull: FloatArray, sense: float) 
 
 
 def _rays(flanks: tuple[Flank, ...], k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wrenches (6, m) of the rays of all friction cones, and the friction and normal force of each on flank `k`."""
+    """Return the wrenches (6, m) of the rays of all friction cones.
+
+    The other results are the friction and the normal force of each ray on flank `k`.
+    """
     angles = 2.0 * np.pi * np.arange(CONE_RAYS) / CONE_RAYS
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(CONE_RAYS)])
     columns, friction, normal = [], [], []

@@ -157,7 +157,9 @@ class RangeMode:
         return self.strain > ALONE and self.kinetic > ALONE
 
     def excess(self, friction: Friction) -> float:
-        """Return the modal force over 4/π times the modal Coulomb limit; above 1, friction alone cannot bound the resonance.
+        """Return the modal force over 4/π times the modal Coulomb limit.
+
+        Above 1, friction alone cannot bound the resonance.
 
         It is infinite without friction, and zero if the limit grows with the normal motion of the mode.
         """
@@ -170,13 +172,16 @@ class RangeMode:
 
 
 def springs_of(system: System, holds: BoolArray, sliding: BoolArray | None = None) -> FloatArray:
-    """Return the (3 n_contacts,) spring stiffnesses of sticking contacts `holds` (n_contacts,), N/m, without `sliding` directions."""
+    """Return the (3 n_contacts,) spring stiffnesses of sticking contacts, N/m.
+
+    `holds` (n_contacts,) marks the sticking contacts; `sliding` directions have no stiffness.
+    """
     springs = np.where(np.repeat(holds, 3), system.springs.stuck_stiffness(), 0.0)
     return springs if sliding is None else np.where(sliding, 0.0, springs)
 
 
 def range_modes(system: System, load: HarmonicLoad, within: Range, springs: FloatArray) -> list[RangeMode]:
-    """Return the modes that harmonics of a load meet in a range of frequencies, with linear springs in place of contacts.
+    """Return the modes that harmonics of a load meet in a frequency range, with linear springs in place of contacts.
 
     Parameters
     ----------
@@ -247,7 +252,10 @@ def _most_moved(structure: Structure, mode: StuckMode) -> tuple[str, float]:
 
 
 def complex_stiffness(ratio: float) -> complex:
-    """Return the describing function of a spring with a slider, over its stiffness, at `ratio` times the amplitude at the onset of slip."""
+    """Return the describing function of a spring with a slider, over its stiffness.
+
+    `ratio` is the amplitude over the amplitude at the onset of slip.
+    """
     if ratio <= 1.0:
         return 1.0 + 0.0j
     angle = np.arccos(1.0 - 2.0 / ratio)
@@ -304,7 +312,8 @@ def damped_modes(
 
     Notes
     -----
-    The basis consists of the modes with stuck contacts and with sliding contacts, up to `BEYOND` times the highest frequency.
+    The basis consists of the modes with stuck contacts and with sliding contacts, up to `BEYOND` times the highest
+    frequency.
     """
     here = system.at(within.middle)
     slips = friction.slips & (springs > 0.0)

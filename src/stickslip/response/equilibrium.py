@@ -1,4 +1,4 @@
-"""Static equilibrium under the centrifugal load: displacements, contact forces, and contact states for small vibrations."""
+"""Static equilibrium under the centrifugal load, and contact states for small vibrations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,10 @@ FAR = 1e6  # m: gap at which every contact is open, also in dimensionless models
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """Static problem with an additional spring on every coordinate, p times the typical contact stiffness; p = 0 is the real problem."""
+    """Static problem with an additional spring on every coordinate, p times the typical contact stiffness.
+
+    At p = 0 it is the real problem.
+    """
 
     balance: HarmonicBalance
 

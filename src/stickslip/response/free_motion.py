@@ -25,7 +25,7 @@ Product = Callable[[FloatArray], FloatArray]
 STEPS = 12  # of each iteration; an undetermined vector appears in two or three
 SETTLED = 0.01  # relative change of a singular value that ends an iteration
 MANY = 2000  # unknowns above which matrix-vector products are cheaper than LU factors
-SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian below which a coordinate counts as undetermined
+SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian of an undetermined coordinate
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,9 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
 
 
 def as_array(jac: FloatArray) -> Held:
-    """Return the ratio of smallest to largest singular value, and the vector of the smallest, by iterations on one LU factorisation.
+    """Return the ratio of smallest to largest singular value, and the vector of the smallest.
+
+    Iterations use one LU factorisation.
 
     Rows and columns are balanced first: translations and rotations differ by orders of magnitude.
     """
@@ -93,7 +95,9 @@ def as_array(jac: FloatArray) -> Held:
 
 
 def by_products(jac: StructuredJacobian) -> Held | None:
-    """Return the same ratio and vector by matrix-vector products, for thousands of contacts; None if an iteration does not converge.
+    """Return the same ratio and vector by matrix-vector products, for thousands of contacts.
+
+    The result is None if an iteration does not converge.
 
     Each coordinate is balanced in each harmonic by its coupling within this harmonic.
     """

@@ -160,7 +160,9 @@ def _beside(problem: ForcedProblem, balance: HarmonicBalance, point: ForcedPoint
 
 
 def halved(system: System, groups: Sequence[str], position: FloatArray, area: FloatArray) -> tuple[System, int] | None:
-    """Return a system with half the points of its meshed contacts, and the number of removed points; None if no contact has enough points.
+    """Return a system with half the points of its meshed contacts, and the number of removed points.
+
+    The result is None if no contact has enough points.
 
     Parameters
     ----------
@@ -175,8 +177,8 @@ def halved(system: System, groups: Sequence[str], position: FloatArray, area: Fl
 
     Notes
     -----
-    A remaining point takes over the stuck stiffness of its removed neighbour. Its gap is the mean of both gaps, weighted by their
-    stiffness. The contact keeps its total stiffness and its centre.
+    A remaining point takes over the stuck stiffness of its removed neighbour. Its gap is the mean of both gaps,
+    weighted by their stiffness. The contact keeps its total stiffness and its centre.
     """
     own = system.interface
     stiffness = own.stuck_stiffness().reshape(-1, 3).sum(axis=1)

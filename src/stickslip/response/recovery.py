@@ -70,7 +70,9 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
 
 
 def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the damping ratio of a linear oscillator with the same loss factor: at a peak, half the inverse of the quality factor.
+    """Return the damping ratio of a linear oscillator with the same loss factor.
+
+    At a peak this is half the inverse of the quality factor.
 
     ``ζ = W / (4π U)``, where W is the work of the harmonic loads in a cycle, which equals the total dissipation of a
     steady motion, and U the largest vibration energy in structure and contacts, twice its mean. NaN without a
@@ -91,7 +93,7 @@ def damped_share(problem: ForcedProblem, point: ForcedPoint, ratio: float) -> fl
 
 
 def _work_and_energy(problem: ForcedProblem, point: ForcedPoint) -> tuple[float, float, float]:
-    """Return the work of the harmonic loads in a cycle, its largest value for any phases, and the largest vibration energy, J."""
+    """Return the work of the harmonic loads in a cycle, its largest value for any phases, and the largest energy, J."""
     linear, every = problem.low.linear, fields(problem, point)
     order = len(point.coefficients) - 1
     moved = linear.recover(point.omega, point.coefficients)

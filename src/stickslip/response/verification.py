@@ -1,4 +1,4 @@
-"""Check of the harmonics: predicted change of a solution with a judging set of harmonics (Gastaldi & Berruti 2017, section 6).
+"""Check of the harmonics: predicted change with a judging set (Gastaldi & Berruti 2017, section 6).
 
 The contribution of each missing harmonic to the outputs is the criterion of `GoalOriented`.
 """
@@ -65,7 +65,9 @@ class SupportCheck:
 
 @by_one_thread
 def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor: int = 2) -> tuple[SupportCheck, ...]:
-    """Predict the change of every solved point by all harmonics up to a multiple of the reference order, and by its judging set.
+    """Predict the change of every solved point by more harmonics.
+
+    These are all up to a multiple of the reference order, and the judging set.
 
     Each point takes two Newton steps: two contact evaluations and two linear solutions. The first step keeps the
     contact states of the point; the second uses the states after the first. If the two predictions differ by more than
@@ -104,7 +106,9 @@ def check_support(problem: ForcedProblem, points: Sequence[ForcedPoint], factor:
 
 
 def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
-    """Return the predicted relative change of a solution by its judging set, from the continuation or from Newton steps.
+    """Return the predicted relative change of a solution by its judging set.
+
+    It comes from the continuation or from Newton steps.
 
     For a motion found by shooting, return the estimated error of the time step.
 
@@ -150,7 +154,10 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> float:
 
 
 def _led_on(problem: ForcedProblem, low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float) -> Alert:
-    """Return the error predicted by two Newton steps with more harmonics; if they disagree, solve with Newton's method."""
+    """Return the error predicted by two Newton steps with more harmonics.
+
+    If they disagree, Newton's method is used.
+    """
     first = jacobian_alert(low, high, x, omega, problem.measure, problem.alert_solve)
     second = asked_again(low, high, x, omega, first, problem.measure, problem.alert_solve)
     if abs(second.error - first.error) <= SAME_RTOL * second.error or high.size > MAX_ROWS:
@@ -176,7 +183,9 @@ def with_waves(problem: ForcedProblem, own: HarmonicBalance, top: int) -> Harmon
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
-    """Return the problem with all harmonics up to `factor` times the reference order, its judging set, and enough samples.
+    """Return the enlarged problem with enough samples.
+
+    It has all harmonics up to `factor` times the reference order, and its judging set.
 
     The waves of a wheel limit the judging set.
     """

@@ -47,12 +47,15 @@ class Basins:
         return self.count(motion) / len(self.ends) if self.ends else np.nan
 
     def interval(self, motion: int) -> tuple[float, float]:
-        """Return the 95 % confidence interval of the share of starts that end on a motion, for starts drawn in the same way."""
+        """Return the 95 % confidence interval of the share of starts that end on a motion."""
         return share_interval(self.count(motion), len(self.ends))
 
 
 def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the binomial confidence interval of Clopper and Pearson (1934) for `count` out of `starts`; (0, 1) without starts."""
+    """Return the binomial confidence interval of Clopper and Pearson (1934).
+
+    It is the interval of the share for `count` out of `starts`; (0, 1) without starts.
+    """
     rest_of = 0.5 * (1.0 - confidence)
     low = float(betaincinv(count, starts - count + 1, rest_of)) if count > 0 else 0.0
     high = float(betaincinv(count + 1, starts - count, 1.0 - rest_of)) if count < starts else 1.0
@@ -61,7 +64,9 @@ def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> t
 
 @dataclass(frozen=True, eq=False)
 class StartSampler:
-    """Sampler of random states about a mean displacement, with displacement and velocity of each of the lowest modes uniform in a disc.
+    """Sampler of random states about a mean displacement.
+
+    Displacement and velocity of each of the lowest modes are uniform in a disc.
 
     Parameters
     ----------
@@ -112,7 +117,10 @@ def not_marched(system: System) -> str:
 def sampler(
     problem: ForcedProblem, omega: float, motions: list[ComplexArray], modes: int, spread: float
 ) -> StartSampler:
-    """Return a sampler of states about the mean of motions (H+1, n), m, up to `spread` times their largest amplitude in each mode."""
+    """Return a sampler of states about the mean of motions (H+1, n), m.
+
+    States reach `spread` times the largest amplitude of the motions in each mode.
+    """
     structure = one_structure(problem.system.stuck_structure(), "all motions")
     own = normal_modes(structure, min(modes, structure.n))
     shapes = np.asarray(own.shapes).real

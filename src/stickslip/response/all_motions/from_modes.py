@@ -78,7 +78,10 @@ def _harmonics(order: int, periods: int) -> list[int]:
 
 
 def _shapes(problem: ForcedProblem, balance: HarmonicBalance, modes: int) -> Iterator[FloatArray]:
-    """Yield the distinct shapes (n_retained,) of the lowest modes with stuck and with open contacts, scaled to a largest entry of one."""
+    """Yield the distinct shapes (n_retained,) of the lowest modes with stuck and with open contacts.
+
+    The largest entry of a shape is one.
+    """
     seen: list[FloatArray] = []
     for side in (problem.system.stuck_structure(), problem.system.structure):
         structure = one_structure(side, "all motions")

@@ -1,4 +1,4 @@
-"""Search for all motions by a sweep, deflation at some frequencies and random states in time, with a branch for each new motion."""
+"""Search for all motions by a sweep, deflation and random states in time; each new motion is followed as a branch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -133,7 +133,10 @@ class _Search:
         return self._spent()
 
     def _at(self, omega: float, but: int = -1) -> list[tuple[int, FloatArray]]:
-        """Return the distinct solutions at a frequency with the numbers of their branches, without branches found in time at place `but`."""
+        """Return the distinct solutions at a frequency with the numbers of their branches.
+
+        Branches found in time at the place `but` are left out.
+        """
         found: list[tuple[int, FloatArray]] = []
         for number, stage in enumerate(self._branches()):
             if but >= 0 and (stage.origin, stage.place) == ("time", but):
@@ -247,7 +250,10 @@ class _Search:
         return None, most
 
     def _guesses(self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator) -> Iterator[FloatArray]:
-        """Yield an endless sequence of starts: the stuck vibration, scaled known motions, then random scales, phases and harmonics."""
+        """Yield an endless sequence of starts.
+
+        They are the stuck vibration, scaled known motions, then random scales, phases and harmonics.
+        """
         stuck = bonded_start(self.balance, omega, self.problem.system)
         yield stuck
         still = np.where(self.weights == 0.0, 1.0, 0.0)
@@ -339,7 +345,10 @@ class _Search:
         )
 
     def _change(self, point: ForcedPoint) -> float:
-        """Return the change of a motion by more harmonics, relative to its vibration; NaN for a wheel, whose waves limit the harmonics."""
+        """Return the change of a motion by more harmonics, relative to its vibration.
+
+        It is NaN for a wheel, whose waves limit the harmonics.
+        """
         side = self.problem.system.structure
         if side.wheel is not None or side.speed_follows_frequency:
             return np.nan
@@ -354,7 +363,10 @@ class _Search:
 
 
 def search_seconds(problem: ForcedProblem, search: MotionSearch) -> float:
-    """Estimate the time of deflated solves and starts, s, without new branches; the budget may end the search earlier."""
+    """Estimate the time of deflated solves and starts, s, without new branches.
+
+    The budget may end the search earlier.
+    """
     order, omega = search.periods * search.harmonics, search.places[0] / search.periods
     whole = with_stiffness(problem.balance(harmonics_of(order)))
     balance = replace(whole, jacobian="dense")

@@ -83,7 +83,10 @@ class Stretch:
 
 
 def stretch(problem: ForcedProblem, before: ForcedPoint, after: ForcedPoint) -> Stretch | None:
-    """Return the segment between two neighbouring points, both with the larger set of harmonics; None without such solutions."""
+    """Return the segment between two neighbouring points, both solved with the larger set of harmonics.
+
+    It is None without such solutions.
+    """
     support = max(before, after, key=lambda p: p.harmonics.size).support
     balance = problem.balance(support)
     following = problem.following(balance)
@@ -99,7 +102,10 @@ def stretch(problem: ForcedProblem, before: ForcedPoint, after: ForcedPoint) -> 
 
 
 def _solved(balance: Balance, following: Following, point: ForcedPoint) -> Point | None:
-    """Return a point solved with the harmonics of a balance, with its tangent towards growing frequency; None without a nearby solution."""
+    """Return a point solved with the harmonics of a balance; None without a nearby solution.
+
+    Its tangent points towards growing frequency.
+    """
     x = balance.unknowns(point.coefficients)
     found = start_point(balance, x, point.omega, following)
     if not found.solution.status.converged:

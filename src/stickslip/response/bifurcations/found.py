@@ -72,7 +72,10 @@ class Bifurcation:
 
     @property
     def beat(self) -> float:
-        """Second frequency of the motions from a Neimark-Sacker bifurcation, rad/s, up to multiples of the first; otherwise 0."""
+        """Second frequency of the motions from a Neimark-Sacker bifurcation, rad/s; otherwise 0.
+
+        It is known up to multiples of the first frequency.
+        """
         if self.kind != "Neimark-Sacker":
             return 0.0
         return float(abs(np.angle(self.multiplier))) / (2.0 * np.pi) * self.omega

@@ -27,7 +27,7 @@ from stickslip.solve.branch import Point
 TOLERANCE = 1e-6  # tolerance of the location, as a length along the branch
 MAX_EXAMINED_MOTIONS = 300  # largest number of motions with computed multipliers
 LOOKING = 2 / 3  # share of these for points of the branch; the others serve the location of bifurcations
-JUMP = 5e-3  # change of a modulus within the last bracket that counts as a jump; a smooth change is a hundred times smaller
+JUMP = 5e-3  # change of a modulus within the last bracket that is a jump; smooth changes are a hundred times smaller
 BESIDE = (
     0.5,
     0.2,
@@ -257,7 +257,10 @@ class _Walk:
             self._locate(step, a, beside_fold=another)
 
     def _locate(self, step: Stretch, place: int, *, beside_fold: bool) -> None:
-        """Locate all crossings within a step, one by one in the remaining parts on both sides; a fold divides the step first."""
+        """Locate all crossings within a step, one by one in the remaining parts.
+
+        A fold divides the step first.
+        """
         at = [step.before, step.after]
         if beside_fold:
             at[1:1] = self._around(step)
@@ -272,7 +275,10 @@ class _Walk:
             self._within(step, step.between(low, high), place, spectra[i], spectra[i + 1], neutral)
 
     def _around(self, step: Stretch) -> list[Point]:
-        """Return two points about a fold between which an odd number of multipliers crosses, as at a fold; empty without such points."""
+        """Return two points about a fold between which an odd number of multipliers crosses, as at a fold.
+
+        The list is empty without such points.
+        """
         fold = step.fold()
         if not fold.solution.status.converged:
             return []
@@ -311,7 +317,10 @@ class _Walk:
     def _root(
         self, step: Stretch, k: int, first: Spectrum, last: Spectrum, neutral: int
     ) -> tuple[Point, _Seen, _Seen] | str:
-        """Return the point at which the k-th modulus passes the circle, and its neighbours on both sides; or the reason for a failure."""
+        """Return the point at which the k-th modulus passes the circle, and its neighbours on both sides.
+
+        After a failure, return its reason.
+        """
         if first.rough(k, ROUGH) and last.rough(k, ROUGH):
             return ROUGHLY
         known: list[_Seen] = [(step.before, first), (step.after, last)]
@@ -384,7 +393,10 @@ def _at_one_beside(fold: Bifurcation, other: Bifurcation) -> bool:
 
 
 def _not_told_apart(fold: Bifurcation, other: Bifurcation) -> bool:
-    """Whether a crossing, within its errors, lies at 1 and at a fold: two multipliers that meet there may look like a complex pair."""
+    """Whether a crossing, within its errors, lies at 1 and at a fold.
+
+    Two multipliers that meet there may look like a complex pair.
+    """
     at_one = abs(other.multiplier - 1.0) <= other.multiplier_error
     return at_one and abs(other.omega - fold.omega) <= other.omega_error + fold.omega_error
 

@@ -1,4 +1,4 @@
-"""Forced response with a longer period or less symmetry: over several load periods, or with independent sectors of a wheel."""
+"""Forced response over several load periods, or with independent sectors of a wheel."""
 
 from dataclasses import dataclass, replace
 

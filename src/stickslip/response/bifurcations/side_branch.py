@@ -102,7 +102,10 @@ class SideBranch:
         return list(range(output, self.problem.system.outputs.size, each))
 
     def localisation(self, point: ForcedPoint) -> float:
-        """Return the share of the squared amplitudes in the most active sector; without a wheel, in the most active coordinate."""
+        """Return the share of the squared amplitudes in the most active sector.
+
+        Without a wheel it refers to the most active coordinate.
+        """
         size = np.sum(np.abs(point.coefficients[1:]) ** 2, axis=0)
         group = np.arange(size.size) if self.sector_of is None else self.sector_of
         each = np.bincount(group, size)
@@ -232,7 +235,9 @@ def both_ways(
     points: int,
     over: Callable[[], str] = _never,
 ) -> tuple[list[ForcedPoint], str]:
-    """Follow a branch from one of its points in both directions; return at most `points` points in their order, and the reason for the end.
+    """Follow a branch from one of its points in both directions.
+
+    Return at most `points` points in their order, and the reason for the end.
 
     `over` is called before each step; a non-empty result ends the branch and is the reason.
     """
@@ -325,7 +330,10 @@ class _Way:
 
 @dataclass(eq=False)
 class _Apart:
-    """Difference of a branch from the original branch at the same frequency; it passes zero where the branch returns."""
+    """Difference of a branch from the original branch at the same frequency.
+
+    It passes zero where the branch returns.
+    """
 
     balance: Balance
     following: Following
@@ -430,7 +438,10 @@ def candidates(directions: FloatArray, balance: HarmonicBalance, group: IntArray
 def first_point(
     balance: HarmonicBalance, point: Point, direction: FloatArray, following: Following, end: float
 ) -> Point | None:
-    """Return the first point of the branch in a direction, with its tangent away from the known branch; None without convergence."""
+    """Return the first point of the branch in a direction; None without convergence.
+
+    Its tangent points away from the known branch.
+    """
     measure = measure_at(point.x, following)
     unit = direction / measure.of(direction)
     for away in AWAY:

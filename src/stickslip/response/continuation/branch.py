@@ -84,7 +84,10 @@ class Followed:
 
 
 class Curve(Protocol):
-    """Curve of solutions of one equation with several levels of harmonics; the default methods suit a curve with one level."""
+    """Curve of solutions of one equation with several levels of harmonics.
+
+    The default methods suit a curve with one level.
+    """
 
     @property
     def levels(self) -> int:
@@ -100,7 +103,10 @@ class Curve(Protocol):
         ...
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], effort: float) -> Solution:
-        """Solve at a value that no branch reached, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
+        """Solve at a value that no branch reached.
+
+        `effort` is the share of the Newton steps of `steps_at_most`; 0: Newton's method only.
+        """
         ...
 
     def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
@@ -140,7 +146,10 @@ class Curve(Protocol):
         return True
 
     def stored(self, found: Followed) -> Followed:
-        """Return a solution in the form in which the journal restores it, so that an interrupted run continues identically."""
+        """Return a solution in the form in which the journal restores it.
+
+        An interrupted run thus continues identically.
+        """
         return found
 
     def height(self, found: Followed) -> float:
@@ -258,7 +267,10 @@ def following_vibration(problem: AnyBalance, control: StepControl, newton: Newto
 
 
 def vibration_weights(problem: AnyBalance) -> FloatArray:
-    """Return the weight of each unknown in the step length; zero for the static part, which would hide the growth of the vibration."""
+    """Return the weight of each unknown in the step length.
+
+    It is zero for the static part, which would hide the growth of the vibration.
+    """
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0
     return weights

@@ -20,14 +20,17 @@ RECENT = 12  # number of last points along which a step may return
 RUN_BACK = 8  # smallest number of points for a branch that runs back beside itself
 BACK = 0.3  # distance from the known branch, over the step, up to which a step returns along it
 
-# budget of a branch for each point, in Newton steps with the most harmonics; beyond half of it fewer levels are allowed.
+# budget of a branch for each point, in Newton steps with the most harmonics; its second half allows fewer levels.
 # Every point adds its share, so that the result does not depend on the number of requested points
 EFFORT = 8.0
 MIN_LEVELS = 2  # levels that are always allowed
 
 
 def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
-    """Return the number of allowed levels after `points` points and `spent` work: all during the first half of the budget, then fewer."""
+    """Return the number of allowed levels after `points` points and `spent` work.
+
+    All levels are allowed during the first half of the budget, then fewer.
+    """
     levels = curve.levels
     if levels <= MIN_LEVELS:
         return levels
@@ -37,7 +40,10 @@ def levels_left(curve: Curve, route: Route, points: int, spent: float) -> int:
 
 
 def without_more(curve: Curve, levels: int, made: Followed) -> Followed:
-    """Return a solution with its error estimated from fewer harmonics if no audit can follow, since predictions need a confirmation."""
+    """Return a solution with its error estimated from fewer harmonics if no audit can follow.
+
+    Predictions without a confirmation are not reliable enough.
+    """
     last = made.kind != "audit" and 0 < made.level == levels - 1 < curve.levels - 1
     if not (last and made.converged) or made.judged.bound == 0.0:
         return made
@@ -80,7 +86,10 @@ def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
 def fresh(
     curve: Curve, route: Route, index: int, level: int, p: float, near: Sequence[Followed], effort: float
 ) -> Followed:
-    """Solve at a value that no branch reached, with a share `effort` of the Newton steps of `steps_at_most`; 0: Newton's method only."""
+    """Solve at a value that no branch reached.
+
+    `effort` is the share of the Newton steps of `steps_at_most`; 0: Newton's method only.
+    """
     solution = curve.fresh(level, p, near, effort)
     latest = Latest(curve.problem(level))
     following = curve.following(level)
@@ -94,7 +103,10 @@ def fresh(
 
 
 def beside(curve: Curve, near: Sequence[Followed], missing: Followed, effort: float) -> Followed:
-    """Solve at a failed value along the branches of its neighbours, with a share `effort` of the Newton steps of `steps_at_most`."""
+    """Solve at a failed value along the branches of its neighbours.
+
+    `effort` is the share of the Newton steps of `steps_at_most`.
+    """
     spent: list[Solution] = [missing.point.solution]
     for end in near:
         left = steps_at_most(missing.point.x.size, effort) - sum(s.iterations for s in spent[1:])
@@ -137,7 +149,9 @@ def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
 
 
 def turned_for_nothing(curve: Curve, route: Route, branch: Sequence[Followed]) -> int:
-    """Return the number of points at the end of a branch that run back beside it over a step length: all points after the turn, or 0.
+    """Return the number of points at the end of a branch that run back beside it over a step length.
+
+    These are all points after the turn, or 0.
 
     Contacts that lift off many times in a period may cause such a fold on the last level; more harmonics would remove
     it.

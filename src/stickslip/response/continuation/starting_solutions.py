@@ -1,4 +1,4 @@
-"""Periodic solutions without a nearby one: a sequence of methods with limited Newton steps, and homotopies as the last one.
+"""Periodic solutions without a nearby one: methods with limited Newton steps, and homotopies as the last.
 
 In a homotopy the excitation grows first, then the higher harmonics join.
 """
@@ -41,7 +41,9 @@ def without_branch(
     near: Sequence[FloatArray] = (),
     effort: float = 1.0,
 ) -> Solution:
-    """Solve at one frequency from several starts: nearby motions, static equilibrium with bonded vibration, few harmonics, `solve_robustly`.
+    """Solve at one frequency from several starts.
+
+    They are nearby motions, the static equilibrium with bonded vibration, few harmonics, and `solve_robustly`.
 
     Parameters
     ----------

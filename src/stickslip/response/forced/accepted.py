@@ -48,7 +48,10 @@ def audits_by_frequency(points: Sequence[ForcedPoint]) -> dict[float, list[Force
 
 
 def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the points of the published passages, each with its point of the first passage, which may be the same one."""
+    """Return the points of the published passages, each with its point of the first passage.
+
+    Both may be the same point.
+    """
     low = points_of_branch(points, "low")
     high = {p.index: p for p in points if p.stage == "high"}
     kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
@@ -100,7 +103,10 @@ def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[
 
 
 def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
-    """Return the end frequency, rad/s, of a branch through a run of repeats: at the next point without an alert, or at the last point."""
+    """Return the end frequency, rad/s, of a branch through a run of repeats.
+
+    It is at the next point without an alert, or at the last point.
+    """
     return low[min(last + 1, len(low) - 1)].omega
 
 

@@ -121,7 +121,10 @@ class ForcedCurve:
         return Judged(bound, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step, point: Point) -> Judged:
-        """Predict the error by a Newton step with the harmonics of the next level; a second step gives its uncertainty."""
+        """Predict the error by a Newton step with the harmonics of the next level.
+
+        A second step gives the uncertainty of the prediction.
+        """
         more, following = self._reference(level, point), self.supports[level + 1]
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
         kept: list[tuple[_Inverse | None, float]] = []
@@ -143,7 +146,10 @@ class ForcedCurve:
         return Judged(bound, (), start)
 
     def _reference(self, level: int, point: Point) -> HarmonicBalance:
-        """Return the reference problem of a level: with the harmonics of the next one, the judging set, and harmonics that excite a resonance."""
+        """Return the reference problem of a level.
+
+        It has the harmonics of the next level, the judging set, and harmonics that excite a resonance.
+        """
         own, following = with_stiffness(self.problem(level)), self.supports[level + 1]
         wanted = {*following, *judging_set_of(own), *ringing(own, point.x, point.p)}
         if wanted <= set(following):
@@ -156,7 +162,10 @@ class ForcedCurve:
     def _doubt(
         self, step: Step, more: HarmonicBalance, x: FloatArray, inverse: _Inverse | None, residual: float
     ) -> float:
-        """Return the uncertainty of a prediction: where contacts change their states, the next step may be as large or larger."""
+        """Return the uncertainty of a prediction.
+
+        Where contacts change their states, the next step may be as large or larger.
+        """
         rest = more.linearise(x, step.omega).residual
         chord = None if inverse is None else inverse(-rest)
         if chord is None or not float(np.linalg.norm(rest)) <= residual:
@@ -167,7 +176,10 @@ class ForcedCurve:
         return DOUBT * step.measure.change(linear.recover(step.omega, q), moved)[0]
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
-        """Bound the error on the last allowed level by the difference from the previous level, which is larger if the series converges."""
+        """Bound the error on the last allowed level by the difference from the previous level.
+
+        This difference is larger than the error if the series converges.
+        """
         before = self.problem(level - 1)
         x = self.lifted(point.x, level, level - 1)
         few_steps = replace(self.following(level - 1).newton, max_iterations=NEARLY)
@@ -266,7 +278,10 @@ def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -
 
 @lru_cache(maxsize=2)
 def _as_forced(curve: ForcedCurve, found: Followed, stage: Stage) -> ForcedPoint:
-    """Return `to_forced`, cached: the same object serves each time, since the continuation restarts from stored points."""
+    """Return `to_forced`, cached.
+
+    The same object serves each time, since the continuation restarts from stored points.
+    """
     point, judged = found.point, found.judged
     return forced_point(
         curve.problem(found.level), point.solution, stage, found.index, point.p, found.seconds, point, judged

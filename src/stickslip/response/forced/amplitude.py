@@ -54,7 +54,9 @@ def extremes(motion: ComplexArray) -> FloatArray:
 def error_measure(
     system: System, sweep: Sweep, driven: Harmonics, dofs: IntArray, places: IntArray | None = None
 ) -> ErrorMeasure:
-    """Return the error measure over `dofs`; `places` are their positions among the compared dofs, unless all dofs are compared.
+    """Return the error measure over `dofs`.
+
+    `places` are their positions among the compared dofs, unless all dofs are compared.
 
     If the amplitude includes more than the driven harmonics, all harmonics except the mean count.
     """

@@ -1,4 +1,4 @@
-"""Search for coexisting motions at frequencies of a response: Newton's method from linear vibrations, and time integration from rest."""
+"""Search for coexisting motions: Newton's method from linear vibrations, and time integration from rest."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -180,7 +180,10 @@ def _from_rest(
 
 
 def _allowed(problem: ForcedProblem, solved_points: Sequence[ForcedPoint]) -> float:
-    """Return the operations that all time integrations may take together; 0 if the structure has no equations in time."""
+    """Return the operations that all time integrations may take together.
+
+    It is 0 if the structure has no equations in time.
+    """
     structure = problem.system.structure
     if structure.wheel is not None or structure.of_harmonic(1).loss is not None:
         return 0.0

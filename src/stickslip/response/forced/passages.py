@@ -33,7 +33,7 @@ BRANCH_SEEDS = 4  # starting points that are tried for a branch with many harmon
 BRANCH_LENGTH = 8  # largest length of such a branch, in multiples of `Sweep.points`
 BACKWARD = 0.1  # share of the range by which it may leave the range
 PATIENT = 16  # iterations of a repeat from one start
-# iterations of a repeat without accepted neighbours: damped steps of planar friction need them, and one success leads to the other repeats
+# iterations of a repeat without accepted neighbours: planar friction needs damped steps, and one success helps others
 ISOLATED = 25
 REPEAT_DISTANCE_RTOL = (
     1.0  # relative distance up to which a neighbouring repeat is used as a start without comparing others
@@ -178,7 +178,10 @@ def _begun(problem: ForcedProblem, low: list[ForcedPoint], high: Mapping[int, Fo
 
 
 def _goes_down(problem: ForcedProblem, point: ForcedPoint) -> bool:
-    """Whether frequencies fall after a point of the first passage; tangents of listed frequencies always point upward."""
+    """Whether frequencies fall after a point of the first passage.
+
+    Tangents of listed frequencies always point upward.
+    """
     if problem.sweep.grid.size:
         return problem.sweep.direction == "down"
     return point.tangent.size > 0 and bool(point.tangent[-1] < 0.0)
@@ -191,7 +194,9 @@ def repeat(
     static: Callable[[], FloatArray] | None = None,
     branch: Sequence[ForcedPoint] = (),
 ) -> ForcedPoint:
-    """Solve one frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from the next point.
+    """Solve one frequency with more harmonics.
+
+    The starts are the best of q + Δq, q and its neighbours, or the branch from the next point.
 
     Parameters
     ----------
@@ -259,7 +264,10 @@ def _by_all(
     static: Callable[[], FloatArray] | None,
     steps: int,
 ) -> list[Solution]:
-    """Solve by homotopies and other globalisations within the given Newton `steps`; no attempt without a static equilibrium."""
+    """Solve by homotopies and other globalisations within the given Newton `steps`.
+
+    There is no attempt without a static equilibrium.
+    """
     if static is None:
         return []
     solution = solve_robustly(
@@ -274,7 +282,10 @@ def _by_all(
 
 
 def _leading(balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]) -> FloatArray | None:
-    """Return the repeat at a neighbouring frequency if it is near: comparing it with other starts costs more than it saves."""
+    """Return the repeat at a neighbouring frequency if it is near.
+
+    Comparing it with other starts costs more than it saves.
+    """
     low = point.coefficients
     for known in beside:
         if known.order < balance.order:
@@ -333,7 +344,10 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
 
 
 def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:
-    """Return the two points of a branch on either side of the frequency of `point`, on the sheet nearest to its motion."""
+    """Return the two points of a branch on either side of the frequency of `point`.
+
+    They lie on the sheet nearest to its motion.
+    """
     ends = [
         sorted((a, b), key=lambda p: abs(p.omega - point.omega))
         for a, b in pairwise(p for p in branch if p.converged)
@@ -486,7 +500,10 @@ def _judged(
 def _more(
     problem: ForcedProblem, had: Harmonics, by_dof: ByDof | None, verdict: Verdict
 ) -> tuple[Harmonics | None, ByDof | None]:
-    """Return the harmonics of a repeat, for all coordinates and for each; None unless they include new ones, so that repeats end."""
+    """Return the harmonics of a repeat, for all coordinates and for each.
+
+    Both are None unless they include new ones, so that repeats end.
+    """
     asked = verdict.again or ()
     if by_dof is None and verdict.again_by_dof is None:
         wanted = tuple(sorted({*had, *asked}))

@@ -27,7 +27,7 @@ from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
 
 Balance = HarmonicBalance | DynamicLagrangian
-FAINTEST = 1e-7  # smallest excitation over static load: a thousand times the residual tolerance, below which the vibration is lost
+FAINTEST = 1e-7  # smallest excitation over static load, a thousand times the residual tolerance
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step by an iterative solver
 SAMPLES_A_HARMONIC = 8  # smallest number of samples, whatever the sweep has
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
@@ -36,7 +36,9 @@ DETOUR = 30  # largest number of points between a neighbour and a frequency
 
 @dataclass(frozen=True, eq=False)
 class ForcedPoint:
-    """Solution at one frequency of a forced response. It holds arrays and numbers only, so that a journal can store and restore it.
+    """Solution at one frequency of a forced response.
+
+    It holds arrays and numbers only, so that a journal can store and restore it.
 
     Attributes
     ----------
@@ -181,7 +183,10 @@ class ForcedProblem:
         return self.others[harmonics]
 
     def local(self, harmonics: Harmonics, by_dof: ByDof | None) -> AnyBalance:
-        """Return the periodic problem with harmonics by retained coordinate; None: with `harmonics` in all coordinates."""
+        """Return the periodic problem with harmonics by retained coordinate.
+
+        If these are None, all coordinates have `harmonics`.
+        """
         whole = self.balance(harmonics)
         if by_dof is None or all(own == harmonics for own in by_dof):
             return whole
@@ -195,7 +200,10 @@ class ForcedProblem:
         next_omega: float | None = None,
         left: Events | None = None,
     ) -> Step:
-        """Return a strategy's input for a scaled solution of `balance`; `left`: the contact events of its evaluation, if known."""
+        """Return a strategy's input for a scaled solution of `balance`.
+
+        `left` are the contact events of its evaluation, if known.
+        """
         smallest = self.sweep.low_harmonics
         by_dof = None
         if isinstance(balance, LocalBalance):
@@ -227,7 +235,10 @@ class ForcedProblem:
         return way
 
     def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance, steps: int = STEPS_BETWEEN) -> Point:
-        """Follow the branch from a solution to another frequency with the harmonics of `balance`, in at most `steps` Newton steps."""
+        """Follow the branch from a solution to another frequency with the harmonics of `balance`.
+
+        It takes at most `steps` Newton steps.
+        """
         following = self.following(balance)
         most = min(DETOUR, following.control.max_points)
         following = replace(following, control=replace(following.control, max_points=most))
@@ -246,7 +257,10 @@ class ForcedProblem:
         return always_kept(self.strategy) != "low"
 
     def asks_again(self, point: ForcedPoint) -> bool:
-        """Whether to repeat a point of the first passage: after an alert, or a failure that neighbours or more harmonics may resolve."""
+        """Whether to repeat a point of the first passage.
+
+        The reason is an alert, or a failure that neighbours or more harmonics may resolve.
+        """
         anew = self.sweep.rescue == "all" or point.support != self.high.harmonics
         return (self.repeats and not point.converged and anew) or self.alerted(point)
 
@@ -258,11 +272,14 @@ class ForcedProblem:
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
-        """Return the largest relative error of a point against a reference at its frequency, a fraction (eq. 29 for the published measure)."""
+        """Return the largest relative error of a point against a reference at its frequency, a fraction.
+
+        This is eq. 29 for the published measure.
+        """
         return self.difference(point.omega, point.coefficients, reference.coefficients)[0]
 
     def difference(self, omega: float, one: ComplexArray, other: ComplexArray) -> tuple[float, int]:
-        """Return the largest difference of two motions (H+1, n_retained), relative to the first, and the position of its dof."""
+        """Return the largest difference of two motions (H+1, n_retained), relative to the first, and its dof."""
         rows = self.measure.rows(len(one), len(other))
         linear = self._linear_of(rows - 1)
         motion, exact = (linear.recover(omega, padded(q, rows - 1)[:rows]) for q in (one, other))
@@ -297,7 +314,10 @@ class ForcedProblem:
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
-    """Set up the forced response of `system` under `load`; the cap of ``auto`` is lowered to the harmonics of a tuned wheel."""
+    """Set up the forced response of `system` under `load`.
+
+    The cap of ``auto`` is lowered to the harmonics of a tuned wheel.
+    """
     refuse_ill_posed(system)
     if sweep.auto and system.structure.harmonics:
         sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
@@ -326,7 +346,9 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
 
 
 def with_stiffness(balance: AnyBalance) -> HarmonicBalance:
-    """Return a periodic problem with contact forces as functions of the gaps, and with all harmonics at all coordinates.
+    """Return a periodic problem with contact forces as functions of the gaps.
+
+    All coordinates have all harmonics.
 
     Raises
     ------
@@ -371,7 +393,10 @@ def forced_point(
     there: Point | None = None,
     judged: Judged = Judged(),  # noqa: B008  # frozen
 ) -> ForcedPoint:
-    """Return a solution as a point of the response, with tangent and step of the branch `there` and its estimated error `judged`."""
+    """Return a solution as a point of the response.
+
+    It has the tangent and step of the branch `there`, and its estimated error `judged`.
+    """
     tangent: FloatArray = np.zeros(0)
     step = sign = 0.0
     if there is not None:

@@ -137,7 +137,10 @@ class _Search:
     count: int = 0
 
     def point(self, sides: Sequence[ForcedPoint], omega: float) -> Taken:
-        """Solve at a frequency with the larger set of its two neighbours' harmonics, and with more if the strategy requests it."""
+        """Solve at a frequency with the larger set of its two neighbours' harmonics.
+
+        More are added if the strategy requests them.
+        """
         made = yield from self._take(lambda: self._between(sides, omega))
         return (yield from self.settled(made))
 
@@ -246,7 +249,10 @@ def _on_seam(known: Sequence[ForcedPoint], top: int) -> bool:
 
 
 def peak_vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
-    """Return the next frequency in the search for the peak; None if it is resolved, at an end of the branch, or beside a fold."""
+    """Return the next frequency in the search for the peak.
+
+    It is None if the peak is resolved, at an end of the branch, or beside a fold.
+    """
     top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):
         return None

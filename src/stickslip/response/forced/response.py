@@ -1,4 +1,4 @@
-"""Steady forced response over a range of frequencies: along the branch with adaptive harmonics, or by the published passages.
+"""Steady forced response over a frequency range: with adaptive harmonics, or by the published passages.
 
 A few points that resolve the resonance peak come last.
 """

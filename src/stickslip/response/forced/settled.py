@@ -78,7 +78,10 @@ def settle(
 
 
 def _open(problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]) -> bool:
-    """Whether a point is doubtful: its predicted error is large, or near the threshold, and no solution with more harmonics confirms it."""
+    """Whether a point is doubtful.
+
+    Its predicted error is large, or near the threshold, and no solution with more harmonics confirms it.
+    """
     limit, bound = problem.strategy.threshold, point.predicted_error
     if not problem.sweep.auto:  # fixed harmonics are kept; doubtful points are only compared with more
         if point.support != problem.sweep.high_harmonics:
@@ -154,7 +157,10 @@ class _Settling:
     spent: int = 0  # solutions for the current point
 
     def settle_highest(self) -> Generator[ForcedPoint, None, set[int]]:
-        """Compare the highest point with more harmonics until the then highest one has been compared; return their positions."""
+        """Compare the highest point with more harmonics until the then highest one has been compared.
+
+        Return the positions of all compared points.
+        """
         seen: set[int] = set()
         for _ in range(SOLUTIONS):
             heights = [self.problem.amplitude(p) if p.converged else -np.inf for p in self.known]
@@ -217,7 +223,10 @@ class _Settling:
         return more, change
 
     def _ways(self, place: int, balance: Balance) -> Iterator[Callable[[], ForcedPoint]]:
-        """Yield attempts with more harmonics: from the point's own motion, then from neighbours with as many harmonics."""
+        """Yield attempts with more harmonics.
+
+        They start from the point's own motion, then from neighbours with as many harmonics.
+        """
         here = self.known[place]
         yield lambda: self._solved(balance, here, here)
         near = [place + side * d for d in range(1, BESIDE + 1) for side in (-1, 1)]

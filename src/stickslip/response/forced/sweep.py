@@ -170,7 +170,10 @@ class Sweep:
 
     @property
     def supports(self) -> tuple[Harmonics, ...]:
-        """Harmonics of each level of ``auto``, the fewest first: multiples of the common divisor of the initial harmonics."""
+        """Harmonics of each level of ``auto``, the fewest first.
+
+        They are multiples of the common divisor of the initial harmonics.
+        """
         low = self.low_harmonics
         step = multiples(low, low[-1])[1]
         rungs = sorted({*(step * rung for rung in RUNGS if step * rung < self.cap), self.cap})

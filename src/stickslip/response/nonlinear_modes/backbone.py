@@ -302,7 +302,7 @@ def mode_way(
     how: Discretisation | None = None,
     sweep: ModeSweep | None = None,
 ) -> ModeWay:
-    """Set up the continuation of a nonlinear mode from its first amplitude to its last; parameters as in `nonlinear_mode`."""
+    """Set up the continuation of a nonlinear mode over its amplitude; parameters as in `nonlinear_mode`."""
     along = sweep or ModeSweep()
     along.require_span(system.interface)
     problem = self_excited_motions(system, load, mode, dof, how or Discretisation())

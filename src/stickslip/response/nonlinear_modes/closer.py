@@ -30,7 +30,7 @@ KNEE = 0.02  # relative difference of frequency or damping ratio from interpolat
 EXTREME = 1e-3  # relative difference of a parabola's vertex from the known extreme value
 LOCATED = 0.01  # width in ln a at which a crossing counts as located
 SILENT = 1e-6  # velocity of a harmonic over the first, up to which no force acts on it
-TAKES_PART = 0.03  # velocity change of a harmonic across a crossing, over the first harmonic, above which the other mode takes part
+TAKES_PART = 0.03  # velocity change at a crossing, over the first harmonic, above which the other mode takes part
 # velocity of a harmonic outside the mode's shape, over the first harmonic, above which it takes part as well:
 # a damped resonance extends over many points with small changes
 AMPLIFIED = 0.1
@@ -280,7 +280,9 @@ class Closer:
 
 
 def _of_top(p: FloatArray, values: FloatArray, i: int) -> Iterator[tuple[float, int]]:
-    """Yield the need for a point near the largest value, which has the index `i`, and the index after which it is inserted.
+    """Yield the need for a point near the largest value, and the index after which it is inserted.
+
+    The largest value has the index `i`.
 
     The need is the distance of the vertex of the parabola through it and its neighbours from this value.
     """

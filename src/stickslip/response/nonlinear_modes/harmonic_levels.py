@@ -91,7 +91,10 @@ class ModeCurve(Curve):
         return own.over_amplitude(family, held=by_energy(own), linear_alone=True)
 
     def judging(self, level: int) -> tuple[SelfExcited, PeriodicProblem] | None:
-        """Return the mode and its periodic problem with the harmonics that judge a level; None if a wheel lacks their waves."""
+        """Return the mode and its periodic problem with the harmonics that judge a level.
+
+        The result is None if a wheel lacks their waves.
+        """
         if level not in self.wider:
             made = self.problems[level].judging()
             self.wider[level] = None if made is None else (made, self._equation(made))
@@ -122,7 +125,10 @@ class ModeCurve(Curve):
         return self.equations[level]
 
     def following(self, level: int) -> Following:
-        """Return the continuation options of a level: the step length measures vibration, frequency and damping, not the mean."""
+        """Return the continuation options of a level.
+
+        The step length measures vibration, frequency and damping, not the mean.
+        """
         own = self.problems[level]
         weights = np.ones(own.balance.size + 2)
         weights[: own.balance.linear.n] = 0.0
@@ -175,7 +181,10 @@ class ModeCurve(Curve):
         return np.inf if step is None else SAFETY * self._change(level, more, more + step)
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
-        """Bound the error on the last level by the difference from the previous level, which is larger if the series converges."""
+        """Bound the error on the last level by the difference from the previous level.
+
+        This difference is larger than the error if the series converges.
+        """
         fewer = self.problem(level - 1)
         start = self.lifted(point.x, level, level - 1)
         found = newton(lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton)

@@ -124,7 +124,7 @@ def _doubted(
 def _numbers(
     backbone: Backbone, load: HarmonicLoad, known: Sequence[ModePoint], amplitude: float, first: int
 ) -> FloatArray:
-    """Return frequency, damping ratio and modal force at an amplitude after the point `first`, interpolated between known points."""
+    """Interpolate frequency, damping ratio and modal force at an amplitude after the point `first`."""
     own = modal_oscillator(replace(backbone, points=tuple(known)), load)
     logs = np.log([known[first].modal_amplitude, amplitude])
     before = float(np.sum(np.abs(np.diff(np.log([p.modal_amplitude for p in known[: first + 1]])))))

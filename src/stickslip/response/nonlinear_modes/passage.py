@@ -1,4 +1,4 @@
-"""Transient passage through a resonance: slowly varying amplitude of a nonlinear mode under a force with swept frequency.
+"""Transient passage through a resonance: slowly varying amplitude of a nonlinear mode under a swept frequency.
 
 The complex modal amplitude ``A = a exp(iθ)`` is relative to a force of phase φ with ``dφ/dt = Ω(t)``. The modal
 stiffness of `sdof_oscillator` is a product ``(iΩ - λ) (iΩ + d + λ)`` with the dashpots d and an eigenvalue λ, near

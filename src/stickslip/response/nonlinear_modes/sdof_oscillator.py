@@ -136,7 +136,10 @@ class ModalOscillator:
             return np.asarray(own / np.abs(here.force))
 
     def by_harmonics(self, place: float) -> float:
-        """Return the predicted relative change of frequency or damping ratio with more harmonics near a position; NaN if unknown."""
+        """Return the predicted relative change of frequency or damping ratio with more harmonics.
+
+        It is the larger one of the neighbouring points; NaN if unknown.
+        """
         if place < self.begins:
             return 0.0
         after = int(np.clip(np.searchsorted(self.place, place), 1, self.place.size - 1))

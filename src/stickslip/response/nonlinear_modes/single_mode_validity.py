@@ -61,7 +61,10 @@ class OtherModes:
     right: ComplexArray
 
     def answer(self, omega: FloatArray, force: ComplexArray, rows: Matrix) -> ComplexArray:
-        """Return the (p, k) response of the other modes to forces (p, n), N, at frequencies (p,), rad/s, in the output `rows` (k, n)."""
+        """Return the (p, k) response of the other modes in the output `rows` (k, n).
+
+        Forces (p, n) are in N, frequencies (p,) in rad/s.
+        """
         taken = (force @ self.left.T) / (1j * omega[:, None] - self.poles)
         here = self.oscillator.at(np.array([self.oscillator.ends[0]]))
         shape = self.oscillator.motion[0, 1] / here.amplitude[0]
@@ -137,7 +140,9 @@ def other_modes(oscillator: ModalOscillator) -> OtherModes:
 
 
 def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
-    """Return the (p, n) residual forces of the equations of motion at synthesised points, N; their modal component is zero.
+    """Return the (p, n) residual forces of the equations of motion at synthesised points, N.
+
+    Their modal component is zero.
 
     Backbone motions have mass-proportional damping instead of the load, and another frequency. Both act on the other
     modes.

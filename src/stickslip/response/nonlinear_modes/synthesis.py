@@ -1,4 +1,4 @@
-"""Nonlinear modal synthesis: forced response at any load level from one backbone, without solving the equations of motion again.
+"""Nonlinear modal synthesis: forced response at any load level from one backbone, without further solutions.
 
 At each amplitude of the backbone, the frequencies at which a load level sustains it are roots of a quartic polynomial
 in Ω (see `sdof_oscillator`): one below and one above the resonance. There is no root where the amplitude needs a higher
@@ -23,7 +23,7 @@ from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
 POINTS = 161  # amplitudes of a curve, each with a frequency on either side of the resonance
-REAL = 1e-6  # relative imaginary part up to which a root counts as real: at a double root, rounding errors enter as a square root
+REAL = 1e-6  # relative imaginary part of a real root: at a double root, rounding enters as a square root
 DIFFERENCE = 1e-5  # step of the position for derivatives
 PEAK_PLACE_RTOL = 1e-9  # tolerance of a peak's position
 TWICE = 2.0
@@ -236,7 +236,10 @@ def _curve(
 
 
 def _sides(oscillator: ModalOscillator, level: float, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the frequencies below and above the resonance at which the level sustains the amplitudes; NaN where there is none."""
+    """Return the frequencies below and above the resonance at which the level sustains the amplitudes.
+
+    They are NaN where there is none.
+    """
     here = oscillator.at(place)
     q = here.polynomial()
     q[:, 4] -= (level * np.abs(here.force) / here.amplitude) ** 2

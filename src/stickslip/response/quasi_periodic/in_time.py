@@ -236,7 +236,10 @@ def _spread(windows: FloatArray) -> float:
 
 
 def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies (Hz) and amplitudes of the largest spectral peaks of samples (n, outputs), `KEPT` in a period."""
+    """Return frequencies (Hz) and amplitudes of the largest spectral peaks of samples (n, outputs).
+
+    A period has `KEPT` samples.
+    """
     n, outputs = samples.shape
     window = np.hanning(n)
     lines = np.abs(np.fft.rfft(samples * window[:, None], axis=0)) * (2.0 / window.sum())
@@ -256,7 +259,10 @@ def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray
 
 
 def second_tone_in_time(problem: TwoTones, motion: TorusMotion, load: HarmonicLoad) -> Statistics:
-    """Return the statistics of a motion with a self-excited second tone, integrated from the balance's solution under the first load."""
+    """Return the statistics of a motion with a self-excited second tone.
+
+    Time integration starts from the balance's solution, under the first load.
+    """
     system, omega = problem.system, motion.omegas[0]
     contacts = system.interface
     start = start_from_harmonics(_folded(motion), omega / _turns(motion)[0], contacts.gap_operator, contacts.laws)
@@ -285,7 +291,9 @@ def _folded(motion: TorusMotion) -> ComplexArray:
 def two_loads_in_time(
     problem: TwoTones, motion: TorusMotion, first: HarmonicLoad, second: HarmonicLoad
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Integrate under loads with a rational frequency ratio near the motion's, and compare with the balance at this ratio.
+    """Integrate under loads with a rational frequency ratio near the motion's.
+
+    The result is compared with the balance at this ratio.
 
     Parameters
     ----------

@@ -94,7 +94,10 @@ class TorusMotion:
         return np.asarray((np.exp(1j * angles) @ self.coefficients[:, dofs]).real)
 
     def at_times(self, dofs: IntArray, times: FloatArray, phase: float = 0.0) -> FloatArray:
-        """Return the (times, len(dofs)) displacements at times (s), m; `phase` is the phase of the second frequency at t = 0."""
+        """Return the (times, len(dofs)) displacements at times (s), m.
+
+        `phase` is the phase of the second frequency at t = 0.
+        """
         return self.values(dofs, self.omegas[0] * times, self.omegas[1] * times + phase)
 
 
@@ -128,7 +131,7 @@ class Envelope:
 
 
 def envelope(motion: TorusMotion, dofs: IntArray, phases: int = 96) -> Envelope:
-    """Return half of peak to peak over one period of the first frequency, as a function of the initial phase of the second."""
+    """Return half of peak to peak over one period of the first frequency, by the initial phase of the second."""
     ratio = motion.omegas[1] / motion.omegas[0]
     a_turn = max(256, int(32 * motion.order * max(1.0, ratio)))
     along = 2.0 * np.pi * np.arange(a_turn + 1) / a_turn
@@ -406,7 +409,9 @@ def with_enough(
 
 
 def off_by(problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]) -> float:
-    """Return the relative change of a motion by a Newton step with more combined frequencies: root mean square of the most changed coordinate.
+    """Return the relative change of a motion by a Newton step with more combined frequencies.
+
+    It is the root mean square of the most changed coordinate.
 
     Parameters
     ----------

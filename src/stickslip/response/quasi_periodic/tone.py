@@ -1,4 +1,4 @@
-"""Motions with a self-excited second frequency, by instability of the forced motion or by flutter, and the search for them.
+"""Motions with a self-excited second frequency, by instability of the forced motion or by flutter.
 
 Beyond a Neimark-Sacker point a second tone with its own frequency grows out of the forced motion. Its phase is
 arbitrary, so its frequency is an additional unknown. For a given amplitude ``a`` of the second tone, another unknown is
@@ -421,7 +421,10 @@ def tone_beside(
 
 
 def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[ComplexArray]:
-    """Yield forced motions (H + 1, n_retained) of a single structure at a frequency, m, on branches from below and from above."""
+    """Yield forced motions (H + 1, n_retained) of a single structure at a frequency, m.
+
+    They lie on branches from below and from above.
+    """
     retained = problem.balance.side.first.retained
     ways: tuple[tuple[float, Literal["up", "down"]], ...] = ((1 - WIDE, "up"), (1 + WIDE, "down"))
     for far, direction in ways:
@@ -446,7 +449,9 @@ def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[Compl
 
 
 def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[list[float], str]:
-    """Return the frequencies, rad/s, of growing disturbances of the forced motion of a single structure, from its multipliers.
+    """Return the frequencies, rad/s, of growing disturbances of the forced motion, from its multipliers.
+
+    The problem is a single structure.
 
     Returns
     -------
@@ -491,7 +496,8 @@ def tones_of_multipliers(multipliers: ComplexArray, omega: float, highest: int, 
 
     Notes
     -----
-    The angle φ of a multiplier determines the frequency of the disturbance only up to multiples of ω: ``|h ω ± φ ω / 2π|``.
+    The angle φ of a multiplier determines the frequency of the disturbance only up to multiples of ω: ``|h ω ± φ ω /
+    2π|``.
     """
     grow = [
         value

@@ -1,4 +1,4 @@
-"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance, and their confirmation by other methods.
+"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance.
 
 Where laws allow several motions, sweeps up and down a wider range find motions on other branches.
 """
@@ -445,7 +445,9 @@ def confirmed(
     discretisation: Discretisation | None = None,
     stepping: TimeStepping | None = None,
 ) -> Confirmation:
-    """Solve a bound again with sampled contacts, and integrate its motion in time from its displacements, velocities and tractions.
+    """Solve a bound again with sampled contacts, and integrate its motion in time.
+
+    The integration starts from the bound's displacements, velocities and tractions.
 
     Parameters
     ----------

@@ -105,7 +105,10 @@ class TractionState:
 
     @property
     def error(self) -> float:
-        """Predicted relative change of the output by the judging set; 0 without forces on it, NaN if a wheel lacks their waves."""
+        """Predicted relative change of the output by the judging set.
+
+        It is 0 without forces on this set, and NaN if a wheel lacks the waves.
+        """
         problem = self.problem
         low = problem.at(self.sliders)
         high = judging_balance(low)
@@ -117,7 +120,10 @@ class TractionState:
         return jacobian_alert(low, high, self.x, self.omega, measure, solve).error
 
     def inside(self) -> FloatArray:
-        """Return the sliders (n, 2), moved slightly inside if they are at an end of their interval, so that the gradient is two-sided."""
+        """Return the sliders (n, 2), moved slightly inside if they are at an end of their interval.
+
+        The gradient is then two-sided.
+        """
         room = self.room
         off = room.slider - room.middle
         most = (1.0 - INSIDE) * room.half
@@ -127,7 +133,10 @@ class TractionState:
         return np.where(room.sticks, inner, self.sliders)
 
     def farthest(self, slope: FloatArray) -> FloatArray:
-        """Return the admissible positions (n, 2) with the largest ``slope · s``, m; sliders with zero slope are not moved."""
+        """Return the admissible positions (n, 2) with the largest ``slope · s``, m.
+
+        Sliders with zero slope are not moved.
+        """
         room, starts = self.room, self.problem.starts
         end = room.middle + np.sign(slope) * room.half
         for c in np.flatnonzero(starts.planar & np.any(slope != 0.0, axis=1)):
@@ -197,7 +206,10 @@ class TractionProblem:
         return replace(self.balance, compiled=replace(self.balance.compiled, sliders=moved))
 
     def solved(self, sliders: FloatArray, omega: float, near: Iterable[TractionState]) -> TractionState | None:
-        """Return the motion for initial sliders, from the first of the motions `near` that converges; None without convergence."""
+        """Return the motion for initial sliders; None without convergence.
+
+        The starts are the motions `near`, of which the first that converges counts.
+        """
         for begin in near:
             found = self._from(sliders, omega, begin, HALVINGS)
             if found is not None:
@@ -251,7 +263,10 @@ def room_of(starts: Starts, period: ContactPeriod) -> Room:
 
 
 def in_all_discs(centres: FloatArray, radii: FloatArray) -> tuple[FloatArray, float]:
-    """Return a point (2,) deep inside all discs of `centres` (2, n) and `radii` (n,), and its distance from the nearest edge."""
+    """Return a point (2,) deep inside all discs, and its distance from the nearest edge.
+
+    The discs have `centres` (2, n) and `radii` (n,).
+    """
     at = centres.mean(axis=1)
     best, depth = at, -np.inf
     for step in range(CENTRING):

@@ -103,7 +103,10 @@ def _same(one: TractionState, other: TractionState) -> bool:
 
 
 def _starts(reference: TractionState, search: TractionSearch) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield slider positions at the limits, at corners and at random, with their shares of the friction limits at t = 0 in the reference."""
+    """Yield slider positions at the limits, at corners and at random.
+
+    The second array has their shares of the friction limits at t = 0 in the reference.
+    """
     problem = reference.problem
     springs = problem.starts.stiffness > 0.0
     count = int(np.count_nonzero(springs))

@@ -111,7 +111,10 @@ class _Equation:
         return ParameterLinearisation(np.full(y.size, np.inf), np.eye(y.size), 0.0, lambda: nothing)
 
     def turn(self, y: FloatArray, p: float) -> None:
-        """Align the equation with the response at a peak; with ``variable_phase``, prescribe the phase of the maximum from here on."""
+        """Align the equation with the response at a peak.
+
+        With ``variable_phase``, the phase of the maximum is prescribed from here on.
+        """
         # evaluated with the present row, so that the orientation of the response is kept
         self.problem = self.problem.aligned(self.problem.bordered.state(y, p))
         if self.problem.by == "variable_phase":

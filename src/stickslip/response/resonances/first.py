@@ -164,7 +164,9 @@ class Start:
 
 
 def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
-    """Return the peaks of the response at a parameter value, the highest first, and the number of evaluations of the sweep.
+    """Return the peaks of the response at a parameter value, the highest first.
+
+    The second result is the number of evaluations of the sweep.
 
     Raises
     ------
@@ -255,7 +257,10 @@ def maxima(heights: FloatArray) -> list[int]:
 
 
 def _descent(heights: FloatArray, top: int, way: int) -> float:
-    """Return the lowest height between an index and the next higher point in a direction; of equal heights the first counts as higher."""
+    """Return the lowest height between an index and the next higher point in a direction.
+
+    Of equal heights the first counts as higher.
+    """
     beside = heights[top + 1 :] if way > 0 else heights[top - 1 :: -1]
     higher = np.flatnonzero(beside > heights[top] if way > 0 else beside >= heights[top])
     between = beside[: higher[0]] if higher.size else beside

@@ -124,7 +124,10 @@ def peak_point(
 
 
 def put_in(balance: HarmonicBalance, motion: ComplexArray, omega: float) -> float:
-    """Return the work of the harmonic load over a period of the first harmonic, J, for the (order+1, n) motion of all dofs."""
+    """Return the work of the harmonic load over a period of the first harmonic, J.
+
+    `motion` (order+1, n) has all dofs.
+    """
     load = balance.linear.load_at(omega)
     return float(sum(-np.pi * h * np.imag(np.vdot(f, motion[h])) for h, f in load.harmonics.items()))
 

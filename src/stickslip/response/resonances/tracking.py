@@ -107,7 +107,10 @@ class Tracker:
         self.problem = replace(self.problem, phase=phase)
 
     def _predicted(self, value: float) -> FloatArray:
-        """Extrapolate through the last two peaks, or along the tangent of a single one; return the last peak if the extrapolation is too far."""
+        """Extrapolate through the last two peaks, or along the tangent of a single one.
+
+        Return the last peak if the extrapolation is too far.
+        """
         (before, earlier), (p, y) = self.known[0], self.known[-1]
         if p != before:
             share = (value - p) / (p - before)
@@ -177,7 +180,10 @@ def _sign_change(rate: Callable[[float], float], at: float, step: float) -> floa
 
 
 def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
-    """Return trackers of the `most` highest peaks at a parameter value; the first one includes the cost of the sweep."""
+    """Return trackers of the `most` highest peaks at a parameter value.
+
+    The first one includes the cost of the sweep.
+    """
     starts, spent = first_peaks(search, value)
     made: list[Tracker] = []
     for start in starts:
@@ -243,7 +249,9 @@ def track_peak(
     output: int = 0,
     discretisation: Discretisation | None = None,
 ) -> Iterator[PeakPoint]:
-    """Follow the highest resonance peak over a design parameter; `follow_peaks` follows several, also in harmonics that are not driven.
+    """Follow the highest resonance peak over a design parameter.
+
+    `follow_peaks` follows several, also in harmonics that are not driven.
 
     Parameters
     ----------

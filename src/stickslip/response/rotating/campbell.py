@@ -1,4 +1,4 @@
-"""Campbell diagram: natural frequencies over rotor speed, tracked by mode shape, and their crossings with engine orders."""
+"""Campbell diagram: natural frequencies over rotor speed, tracked by mode shape, and their engine-order crossings."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -82,7 +82,9 @@ class Campbell:
 
     @property
     def stationary_hz(self) -> FloatArray:
-        """(s, n_modes) frequencies in the stationary frame, Hz: ``|f - kΩ/2π|`` for backward waves, ``f + kΩ/2π`` for forward ones.
+        """(s, n_modes) frequencies in the stationary frame, Hz.
+
+        They are ``|f - kΩ/2π|`` for backward waves, and ``f + kΩ/2π`` for forward ones.
 
         A backward wave slower than the rotation runs forward in this frame.
         """

@@ -1,4 +1,7 @@
-"""Campbell diagrams of a wheel, one for each travelling wave: an engine order meets only modes of the wave that it excites."""
+"""Campbell diagrams of a wheel, one for each travelling wave.
+
+An engine order meets only modes of the wave that it excites.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -158,7 +158,10 @@ def envelope(system: System, load: HarmonicLoad, sweep: SweepInTime) -> Iterator
 
 
 def _longer(error: float) -> float:
-    """Return the factor on the step length; `error` is the error of the step over the allowed one, infinite for a failed step."""
+    """Return the factor on the step length.
+
+    `error` is the error of the step over the allowed one, infinite for a failed step.
+    """
     if np.isinf(error):
         return SHRINK
     share = SAFE * max(error, 1e-12) ** (-1 / 3)
@@ -205,7 +208,10 @@ class _Flow:
         return small.spread(self.balance.coefficients(found.x))
 
     def _condensed(self, omega: float, now: float, known: ComplexArray) -> "_Condensed":
-        """Return the equations of a step on the retained coordinates; the derivative of amplitudes is ``now q + known``."""
+        """Return the equations of a step on the retained coordinates.
+
+        The derivative of the amplitudes is ``now q + known``.
+        """
         side = self.system.structure.at_frequency(omega)
         force = self.balance.linear.load_at(omega).coefficients(self.balance.order)
         rate, parts = self.sweep.signed_rate, []
@@ -241,7 +247,10 @@ class _Flow:
 
 @dataclass(frozen=True, eq=False)
 class _Condensed:
-    """Equations ``S q = g`` of the retained coordinates of harmonics 0 to H, and recovery ``own - through q`` of the others."""
+    """Equations ``S q = g`` of the retained coordinates of harmonics 0 to H.
+
+    The other coordinates are ``own - through q``.
+    """
 
     stiffness: ComplexArray  # (H+1, r, r)
     load: ComplexArray  # (H+1, r)
@@ -295,7 +304,10 @@ def _flow(system: System, load: HarmonicLoad, sweep: SweepInTime) -> _Flow:
 
 
 def _derivative(points: list[_Step], step: float) -> tuple[float, ComplexArray]:
-    """Return the second-order backward difference of amplitudes: the factor of the new ones, and the sum of the known terms."""
+    """Return the second-order backward difference of amplitudes.
+
+    It is the factor of the new ones, and the sum of the known terms.
+    """
     last = points[-1]
     if len(points) < 2:
         return 1.0 / step, -last.q / step

@@ -84,8 +84,9 @@ def flutter_of_wave(
 
     Notes
     -----
-    ``W = π Im(Qᴴ G Q)`` and ``E = ½ ω² Qᴴ M Q``. The eigenvalue method differs by terms of second order in the coefficients: with half the
-    coefficients the difference is a quarter. Structural damping has the sign for positive frequencies.
+    ``W = π Im(Qᴴ G Q)`` and ``E = ½ ω² Qᴴ M Q``. The eigenvalue method differs by terms of second order in the
+    coefficients: with half the coefficients the difference is a quarter. Structural damping has the sign for positive
+    frequencies.
     """
     heavy = int(np.count_nonzero(structure.mass.diagonal()))
     count = min(heavy, 2 * n_modes + SPARE)
@@ -204,7 +205,8 @@ def least_stable_curve(
 
     Notes
     -----
-    Between two waves, frequency and amplitudes of a mode are interpolated linearly in the angle; the coefficients are exact.
+    Between two waves, frequency and amplitudes of a mode are interpolated linearly in the angle; the coefficients are
+    exact.
     """
     turn = 2 * np.pi
     order = np.argsort(np.mod(phase_angles, turn))

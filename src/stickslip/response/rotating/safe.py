@@ -306,6 +306,9 @@ def _points(
 
 
 def _meeting(omega: float, slope: float, engine_order: int, speed: float) -> float:
-    """Return the Ω with ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``; infinite if the order never meets the line."""
+    """Return the Ω with ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``.
+
+    It is infinite if the order never meets the line.
+    """
     rest, rise = omega**2 - slope * speed**2, engine_order**2 - slope
     return math.sqrt(rest / rise) if rise != 0.0 and rest / rise > 0.0 else math.inf

@@ -115,7 +115,10 @@ def _onset(known: "_Sticking", below: float, amplitude: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Sticking:
-    """Motion in which no contact changes its state; its vibration is proportional to the amplitude, about a constant mean."""
+    """Motion in which no contact changes its state.
+
+    Its vibration is proportional to the amplitude, about a constant mean.
+    """
 
     problem: SelfExcited
     equation: PeriodicProblem
@@ -216,7 +219,10 @@ def parameter_over_amplitude(
 
 
 def at_amplitude(problem: SelfExcited, amplitude: float, near: Sequence[FloatArray] = ()) -> AmplitudePoint:
-    """Return the motion of an amplitude, m, and its damping, from unknowns of nearby motions or from the linear mode."""
+    """Return the motion of an amplitude, m, and its damping.
+
+    The starts are unknowns of nearby motions, or the linear mode.
+    """
     found = _solved(problem, problem.over_amplitude(), float(np.log(amplitude)), near)
     return _point(problem, amplitude, found)
 

@@ -104,7 +104,10 @@ def crossings(curve: Sequence[AmplitudePoint]) -> list[tuple[AmplitudePoint, Amp
 
 
 def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list[AmplitudePoint]:
-    """Add extremes of the damping to the solutions of a curve: the largest one, and others that may lie just beyond zero."""
+    """Add extremes of the damping to the solutions of a curve.
+
+    These are the largest one, and others that may lie just beyond zero.
+    """
     known = [p for p in curve if p.converged]
     out, top = known[:1], max((p.level for p in known), default=0.0)
     for i in range(1, len(known) - 1):
@@ -117,7 +120,10 @@ def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list
 
 
 def _extreme(problem: SelfExcited, three: Sequence[AmplitudePoint]) -> AmplitudePoint:
-    """Return the motion with extreme damping near the middle one of three, which has more or less damping than both others."""
+    """Return the motion with extreme damping near the middle one of three.
+
+    This one has more or less damping than both others.
+    """
     upward = -1.0 if three[1].level > three[0].level else 1.0
     best = three[1]
 
@@ -161,7 +167,10 @@ def solve_cycle(
 
 
 def _between(problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint) -> LimitCycle | None:
-    """Return the cycle between two points, directly or by gradual removal of damping from either, since slip begins with a corner."""
+    """Return the cycle between two points.
+
+    It is solved directly, or by gradual removal of damping from either, since slip begins with a corner.
+    """
     share = before.level / (before.level - after.level)
     y = before.unknowns + share * (after.unknowns - before.unknowns)
     ends = np.log([before.amplitude, after.amplitude])
@@ -215,7 +224,9 @@ def _refined(problem: SelfExcited, cycle: LimitCycle, most: int, tolerance: floa
 
 
 def _foretold(problem: SelfExcited, y: FloatArray) -> float:
-    """Predict the relative change of amplitude or frequency, the larger one, by a Newton step with the judging harmonics.
+    """Predict the change of amplitude or frequency by a Newton step with the judging harmonics.
+
+    It is relative, and the larger one of both.
 
     The result is infinite if a wheel lacks their waves.
     """

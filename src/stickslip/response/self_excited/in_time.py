@@ -78,7 +78,9 @@ def march_periods(  # noqa: PLR0913
     *,
     settles: float = 0.0,
 ) -> Marched:
-    """Integrate a structure with contacts over periods of a reference frequency, which may differ from the motion's frequency.
+    """Integrate a structure with contacts over periods of a reference frequency.
+
+    The motion may have another frequency.
 
     Parameters
     ----------
@@ -219,7 +221,10 @@ def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
 
 
 def mixed_start(motions: Sequence[tuple[ComplexArray, float]], like: TransientStart) -> TransientStart:
-    """Return the state at t = 0 of a sum of motions, given by complex amplitudes (n,) and frequencies, rad/s; law states are taken from `like`."""
+    """Return the state at t = 0 of a sum of motions.
+
+    Each has complex amplitudes (n,) and a frequency, rad/s. Law states are taken from `like`.
+    """
     moved = sum((a.real for a, _ in motions), np.zeros_like(like.displacement))
     rate = sum(((1j * omega * a).real for a, omega in motions), np.zeros_like(like.velocity))
     return replace(like, displacement=moved, velocity=rate)

@@ -52,7 +52,9 @@ class StuckMode:
 
 @by_one_thread
 def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> list[StuckMode]:
-    """Return the lowest modes of the structure in the first harmonic; for a wheel, of the wave excited by its engine order.
+    """Return the lowest modes of the structure in the first harmonic.
+
+    For a wheel they belong to the wave excited by its engine order.
 
     Parameters
     ----------
@@ -70,9 +72,10 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
 
     Notes
     -----
-    Eigenvalues of ``λ²M + λC + K`` include Coriolis terms and unsymmetric aerodynamic terms, since undamped modes have other shapes where
-    rotation separates forward and backward waves, or both have equal frequencies. Aerodynamic coefficients are evaluated at each mode's own
-    frequency. With more than 400 coordinates, the basis consists of undamped modes and of static responses to the forces that couple them.
+    Eigenvalues of ``λ²M + λC + K`` include Coriolis terms and unsymmetric aerodynamic terms, since undamped modes have
+    other shapes where rotation separates forward and backward waves, or both have equal frequencies. Aerodynamic
+    coefficients are evaluated at each mode's own frequency. With more than 400 coordinates, the basis consists of
+    undamped modes and of static responses to the forces that couple them.
     """
     springs = system.springs.stuck_stiffness()
     if holds is not None:
@@ -122,7 +125,10 @@ def sprung_modes(
 
 
 def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[Matrix, int]:
-    """Return a basis of unit mass for the lowest modes, and the number of requested undamped modes that do not vibrate."""
+    """Return a basis of unit mass for the lowest modes.
+
+    The second result is the number of requested undamped modes that do not vibrate.
+    """
     moving = int(np.count_nonzero(still.mass.diagonal()))
     wanted = moving if moving <= whole else min(moving, 2 * count + SPARE)
     modes = normal_modes(still, wanted)
@@ -170,7 +176,10 @@ def _eigenpairs(
 
 
 def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Matrix:
-    """Return shapes with the constraint forces of copied dofs, which balance contact forces only, as copies have no mass."""
+    """Return shapes with the constraint forces of copied dofs.
+
+    They balance contact forces only, as copies have no mass.
+    """
     if not multipliers.size:
         return shapes
     copies = multipliers - multipliers.size

@@ -119,7 +119,10 @@ class SelfExcited:
         return int(self.balance.linear.retained[self.position])
 
     def damped(self, level: float) -> HarmonicBalance:
-        """Return the balance at 1 m without a level of damping: `level` · ω_0 · M is subtracted from the damping matrix."""
+        """Return the balance at 1 m without a level of damping.
+
+        `level` · ω_0 · M is subtracted from the damping matrix.
+        """
         rate = -level * self.mode.omega
         return replace(self.balance, linear=self.balance.linear.with_mass_damping(rate))
 
@@ -158,7 +161,10 @@ class SelfExcited:
         return -self.mode.omega * slope
 
     def limit_cycle(self) -> PeriodicProblem:
-        """Return the periodic problem with ``ln a`` as the last unknown and the level of damping as the parameter, zero for a limit cycle."""
+        """Return the periodic problem with ``ln a`` as the last unknown.
+
+        The parameter is the level of damping, zero for a limit cycle.
+        """
 
         def setting(extra: FloatArray, level: float) -> Setting:
             balance = self.balance if level == 0.0 else self.damped(level)
@@ -167,7 +173,10 @@ class SelfExcited:
         return self._bordered(setting)
 
     def unknowns(self, coefficients: ComplexArray, omega: float, last: float) -> FloatArray:
-        """Return the unknowns from a motion (H+1, n_retained) over its amplitude, its frequency, rad/s, and the last unknown."""
+        """Return the unknowns of a motion (H+1, n_retained) over its amplitude.
+
+        They end with its frequency, given in rad/s, and the last unknown.
+        """
         x = replace(self.balance, displacement_scale=1.0).unknowns(coefficients)
         return np.append(x, [np.log(omega / self.mode.omega), last])
 
@@ -193,7 +202,10 @@ class SelfExcited:
         return replace(balance, displacement_scale=a, force_scale=a * self.balance.force_scale)
 
     def guess(self, static: FloatArray, amplitude: float) -> FloatArray:
-        """Return the unknowns of the linear mode about a static state (n_retained of the system,) at an amplitude, m."""
+        """Return the unknowns of the linear mode about a static state at an amplitude, m.
+
+        `static` has the (n_retained,) coordinates of the system.
+        """
         linear = self.balance.linear
         motion = np.zeros((self.balance.order + 1, linear.n), dtype=complex)
         motion[0, np.searchsorted(linear.retained, self.system.retained)] = static / amplitude
@@ -214,7 +226,10 @@ class SelfExcited:
 
 
 def _by_size(state: State) -> FloatArray:
-    """Return the derivative by the logarithm of the scaling amplitude: ``J x - r`` for the balance, and zero for the conditions."""
+    """Return the derivative by the logarithm of the scaling amplitude.
+
+    It is ``J x - r`` for the balance, and zero for the conditions.
+    """
     at = state.at
     return np.append(times(at.jac, state.x) - at.residual, np.zeros(state.extra.size))
 
@@ -322,7 +337,10 @@ def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contac
 
 @lru_cache(maxsize=8)
 def _sliders(interface: Interface) -> dict[int, FloatArray]:
-    """Return for each contact with several sliders the (n, 2) peak-to-peak gaps along t and w above which they slip, m."""
+    """Return for each contact with several sliders the peak-to-peak gaps above which they slip, m.
+
+    Each has (n, 2) entries, along t and w.
+    """
     found: dict[int, FloatArray] = {}
     for law in interface.laws:
         if id(law) not in found:
@@ -332,7 +350,10 @@ def _sliders(interface: Interface) -> dict[int, FloatArray]:
 
 
 def _travels(law: ContactLaw) -> FloatArray:
-    """Return these peak-to-peak gaps for a law with constant slip limits, without elastic springs; none for other laws."""
+    """Return these peak-to-peak gaps for a law with constant slip limits.
+
+    Elastic springs are left out; other laws have none.
+    """
     rows = law.elements() if isinstance(law, PiecewiseLinear) else np.zeros((0, UNILATERAL + 1))
     if np.any(rows[:, UNILATERAL]):
         return np.zeros((0, 2))

@@ -1,4 +1,7 @@
-"""Points in the order of the branch, with cheap indicators of a change of stability: folds, sign of the determinant, contact transitions."""
+"""Points in the order of the branch, with cheap indicators of a change of stability.
+
+They are folds, the sign of the determinant, and contact transitions.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -43,7 +46,10 @@ class Course:
     cut: BoolArray
 
     def like(self, a: int, b: int) -> bool:
-        """Whether all points from a to b have the same sign and transitions, without a fold; then equal verdicts at both ends hold between."""
+        """Whether all points from a to b have the same sign and transitions, without a fold.
+
+        Then equal verdicts at both ends hold between.
+        """
         a, b = min(a, b), max(a, b)
         signs, cycles = self.sign[a : b + 1], set(self.cycle[a : b + 1])
         one = bool(np.all(signs == signs[0])) and len(cycles) == 1 and None not in cycles
@@ -184,7 +190,10 @@ def _located(states: ContactStates, contact: int) -> bytes:
 
 
 def _cycle(rows: FloatArray) -> bytes:
-    """Return the number of distinct successive rows (n, k) of a cycle, and these rows independently of where the cycle begins."""
+    """Return the number of distinct successive rows (n, k) of a cycle, and these rows.
+
+    They do not depend on where the cycle begins.
+    """
     changed = np.any(rows != np.roll(rows, 1, axis=0), axis=1)
     chosen = rows[changed] if np.any(changed) else rows[:1]
     # a contact changes at few of the times at which any contact changes

@@ -109,7 +109,10 @@ def more_harmonics(problem: ForcedProblem, point: ForcedPoint) -> Iterator[Corre
 
 
 def newton_work(rows: int) -> float:
-    """Estimate the floating-point operations of a Newton step with contacts, proportional to the rows (measured from 99 to 3000)."""
+    """Estimate the floating-point operations of a Newton step with contacts.
+
+    They are proportional to the rows (measured from 99 to 3000).
+    """
     return STEP_WORK * rows
 
 

@@ -73,7 +73,9 @@ def stability_in_time(own: InTime, omega: float) -> Stability:
 
 
 def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, int] | None:
-    """Return the modal states, the monodromy matrix (modal states first) and the number of shares of the period; None if unknown.
+    """Return the modal states, the monodromy matrix and the number of shares of the period; None if unknown.
+
+    The matrix has the modal states first.
 
     For a travelling wave the matrix covers one share of the period. For laws with sampled tangents it belongs to the
     finest samples.
@@ -119,7 +121,10 @@ def _prepared(structure: Structure, interface: Interface, omega: float) -> Modal
 def _samples(
     contacts: ContactStates, own: IntArray, gap_coefficients: FloatArray, halves: int
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Return the samples of a period (`halves` / 2 times the smallest number), and the Fourier coefficients of the contacts `own`."""
+    """Return the samples of a period, and the Fourier coefficients of the contacts `own`.
+
+    The samples are `halves` / 2 times the smallest number.
+    """
     samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
     polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     return sample_times(contacts, samples, halves), polynomials

@@ -105,7 +105,10 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
 
 
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
-    """Return the stability, with its motion if the point as solved differs in stability or lies away; unknown if it lies too far away.
+    """Return the stability, with its motion if this is not the point as solved.
+
+    The motion is given if the point differs in stability or lies away; the stability is unknown if it lies too far
+    away.
 
     Near a fold, a stable and an unstable motion may lie within a percent. A point with few harmonics may be closer to
     one of them while more harmonics lead to the other; the verdict then belongs to the motion with more harmonics.
@@ -133,7 +136,10 @@ def _unsure(rung: _Rung) -> Stability:
 def _settled(
     problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
 ) -> tuple[Stability, _Rung]:
-    """Return the stability with increasing harmonics until it is settled, and the last motion; the first error is `times` the change."""
+    """Return the stability with increasing harmonics until it is settled, and the last motion.
+
+    The first error is `times` the change.
+    """
     rungs = more_harmonics(problem, last.point)
     while not best.settled and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)

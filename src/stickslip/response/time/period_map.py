@@ -72,7 +72,9 @@ class Derivative:
     idle: IntArray
 
     def inverse(self) -> FloatArray:
-        """Return the (size, size) pseudo-inverse of ``1 - monodromy``, which turns a defect into a correction; zero in neutral directions.
+        """Return the (size, size) pseudo-inverse of ``1 - monodromy``, which turns a defect into a correction.
+
+        It is zero in neutral directions.
 
         A slider that sticks for the whole period keeps its position, which selects one motion of a family.
         """
@@ -144,7 +146,10 @@ class PeriodMap:
         return self._ended(step, self.marcher.march(step, record), record)
 
     def vibration(self, image: Image) -> float:
-        """Return the size of the vibration over a period in the norm of the states, at least 1e-9 of the final state."""
+        """Return the size of the vibration over a period in the norm of the states.
+
+        It is at least 1e-9 of the final state.
+        """
         n = self.marcher.n
         scale, motion = self.scale[:n], image.record.motion
         if self.shares == 1:
@@ -226,7 +231,10 @@ class PeriodMap:
 def period_map(
     marcher: Marcher, start: TransientStart, symmetry: WaveMotion | None = None
 ) -> tuple[PeriodMap, FloatArray]:
-    """Return the period map of a marcher and the coordinates of `start`; with a symmetry, the map covers a share of the period."""
+    """Return the period map of a marcher and the coordinates of `start`.
+
+    With a symmetry, the map covers a share of the period.
+    """
     linear = tangent_operators(marcher)
     begin = marcher.begun(start)
     speed = marcher.modes.omega * marcher.modes.speed

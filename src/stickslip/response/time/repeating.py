@@ -201,7 +201,10 @@ def _marched(marcher: Marcher, state: StepState, outputs: IntArray, order: int) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """Record of each period: harmonics of the gaps, first harmonic of the outputs, angle of the fastest opening contact."""
+    """Record of each period.
+
+    It has harmonics of the gaps, first harmonic of the outputs, and angle of the fastest opening contact.
+    """
 
     gaps: list[ComplexArray]
     first: list[ComplexArray]
@@ -213,7 +216,10 @@ class _Seen:
 
 
 def _period_by_period(marcher: Marcher, state: StepState, seen: _Seen, rows: FloatArray, order: int, most: int) -> int:
-    """Integrate up to `most` periods or until the motion repeats; return the number of periods after which it does, or 0."""
+    """Integrate up to `most` periods or until the motion repeats.
+
+    Return the number of periods after which it does, or 0.
+    """
     record = marcher.record()
     while len(seen.gaps) < most:
         lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)

@@ -1,4 +1,4 @@
-"""All sectors of a tuned wheel in time: each sector is integrated, since waves belong to harmonics.
+"""All sectors of a tuned wheel in time: each sector is integrated, since only harmonics have waves.
 
 The coordinates and gaps of a tuned wheel have the same meaning in every wave. The motion of sector s is the sum of its
 waves, ``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are discrete Fourier transforms of the
@@ -84,7 +84,10 @@ class SectorsInTime:
         return np.array(rows)
 
     def travelling(self, rows: ComplexArray) -> ComplexArray:
-        """Return the (H + 1, sectors · p) amplitudes in all sectors of quantities (H + 1, p) with the same meaning in every wave, such as gaps."""
+        """Return the (H + 1, sectors · p) amplitudes of quantities (H + 1, p) in all sectors.
+
+        The quantities have the same meaning in every wave, as gaps do.
+        """
         return np.array([_travelling(self.wheel, h, r, self.count) for h, r in enumerate(rows)])
 
     @property
@@ -179,7 +182,7 @@ class InTime:
     ahead: int = 0
 
     def shifted(self, rows: Matrix) -> Matrix:
-        """Return (sectors · p, ...) rows, sector by sector, shifted to the represented sectors after a share of the period."""
+        """Return (sectors · p, ...) rows, sector by sector, shifted by a share of the period."""
         return WaveMotion(self.sectors, self.ahead).shifted(rows)
 
 
@@ -203,13 +206,19 @@ def all_in_time(system: System, gaps: ComplexArray) -> InTime:
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
-    """Return the number of sectors with distinct motions, and the greatest common divisor of engine order and number of sectors."""
+    """Return the number of sectors with distinct motions.
+
+    The second result is the greatest common divisor of engine order and number of sectors.
+    """
     common = gcd(wheel.engine_order, wheel.sectors)
     return wheel.sectors // common, common
 
 
 def sectors_in_time(system: System) -> int:
-    """Return the number of sectors in time: all of a tuned wheel with every wave, the distinct ones of other tuned wheels, otherwise 1."""
+    """Return the number of sectors in time.
+
+    These are all of a tuned wheel with every wave, the distinct ones of other tuned wheels, otherwise 1.
+    """
     wheel = system.structure.wheel
     if wheel is None:
         return 1
@@ -217,7 +226,10 @@ def sectors_in_time(system: System) -> int:
 
 
 def _kept(wheel: TunedWheel) -> int:
-    """Return the number of a sector's own coordinates; copies of neighbours' coordinates and their constraints follow."""
+    """Return the number of a sector's own coordinates.
+
+    Copies of neighbours' coordinates and their constraints follow these.
+    """
     return wheel.n - 2 * wheel.multipliers.size
 
 
@@ -229,7 +241,10 @@ def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix, sectors: int) -> 
 
 
 def _wave(wheel: TunedWheel, k: int) -> Structure:
-    """Return the structure of a wave number, or the conjugate for the opposite direction, whichever has the lower harmonic."""
+    """Return the structure of a wave number, or the conjugate for the opposite direction.
+
+    The one with the lower harmonic is used.
+    """
     chosen = _chosen(wheel.waves, k % wheel.sectors, wheel)
     structure = wheel.waves[chosen]
     return structure if chosen == k % wheel.sectors else _conjugate(structure)

@@ -89,7 +89,10 @@ class Progress:
 
     @property
     def decay(self) -> float:
-        """Largest change of the last third over the third before; NaN without two such stretches or without any change."""
+        """Largest change of the last third over the third before.
+
+        It is NaN without two such stretches or without any change.
+        """
         late, early = last_changes(self.changes)
         return late / early if early > 0.0 else np.nan
 

@@ -107,7 +107,10 @@ class ShootingResult:
 
     @property
     def undecided(self) -> bool:
-        """Whether the stability is unknown, as the step error of the growth exceeds its distance from 1: more steps may decide."""
+        """Whether the stability is unknown, as the step error of the growth exceeds its distance from 1.
+
+        More steps may decide.
+        """
         distance = abs(self.floquet.growth - 1.0)
         return self.converged and UNIT_TOLERANCE < distance <= self.growth_error
 
@@ -420,7 +423,9 @@ def _corrected(
 
 
 def _scattered(first: float, second: float, least: float) -> float:
-    """Return the error of the first of three values from their two changes, which are partly random; infinite if a change is unknown.
+    """Return the error of the first of three values from their two changes.
+
+    The changes are partly random. The error is infinite if a change is unknown.
 
     Further changes are taken as a geometric series with the ratio of the two; `least` is the lower bound of its sum
     over the first change.

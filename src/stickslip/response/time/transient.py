@@ -134,7 +134,10 @@ class TransientResult:
 
     @property
     def coarse(self) -> bool:
-        """Whether the step is too long for the impacts of the stiffest opening contact: harmonics may have an error of a percent."""
+        """Whether the step is too long for the impacts of the stiffest opening contact.
+
+        Harmonics may then have an error of a percent.
+        """
         return self.step_angle > FINE
 
     @property

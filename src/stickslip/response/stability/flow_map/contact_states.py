@@ -78,13 +78,19 @@ class _Spring:
 
     @property
     def changes(self) -> BoolArray:
-        """Return whether each segment begins with a transition; the first may continue the last one of the previous period."""
+        """Return whether each segment begins with a transition.
+
+        The first may continue the last one of the previous period.
+        """
         states = self.segments[:, [STATE, SIGN]]
         return np.asarray(np.any(states != np.roll(states, 1, axis=0), axis=1))
 
 
 def located_part(law: ContactLaw) -> PiecewiseLinear | None:
-    """Return the part of a law with located transitions: the whole law, the normal contact of planar friction, or None."""
+    """Return the part of a law with located transitions.
+
+    It is the whole law, the normal contact of planar friction, or None.
+    """
     if isinstance(law, PiecewiseLinear):
         return law
     return law.normal_contact() if isinstance(law, NormalContact) else None
@@ -97,7 +103,9 @@ def is_located(law: ContactLaw) -> bool:
 
 
 def located_states(interface: Interface, gap_coefficients: FloatArray) -> ContactStates | None:
-    """Return the contact states over a period for laws with located transitions; None if rounding made more transitions than possible.
+    """Return the contact states over a period for laws with located transitions.
+
+    The result is None if rounding made more transitions than possible.
 
     Parameters
     ----------

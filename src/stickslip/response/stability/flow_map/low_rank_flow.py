@@ -133,7 +133,10 @@ class LowRankFlow:
     def _transition(
         self, columns: FloatArray, rows: FloatArray, pulled: FloatArray, length: float
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Return the (2n, 2n) matrix of an interval and the (2n, m) effect of sliders; None if the nodes do not suffice."""
+        """Return the (2n, 2n) matrix of an interval and the (2n, m) effect of sliders.
+
+        The result is None if the nodes do not suffice.
+        """
         n2, r = columns.shape
         nodes, weights = HYPERBOLA
         own, cross = self._resolvent(nodes / length)
@@ -156,7 +159,10 @@ class LowRankFlow:
         return added[:, :n2], added[:, n2:] + self._times(mean, pulled)
 
     def _resolvent(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the (nodes, 2n) factors of the base resolvent for a column itself and for its partner in a complex pair."""
+        """Return the (nodes, 2n) factors of the base resolvent.
+
+        The first act on a column itself, the second on its partner in a complex pair.
+        """
         off = z[:, None] - self.rate
         inverse = 1.0 / (off * off + self.turn * self.turn)
         return off * inverse, np.asarray(self.turn * inverse, dtype=complex)
@@ -234,7 +240,10 @@ def _longest(contacts: ContactStates) -> FloatArray:
 
 
 def _real_form(values: ComplexArray, vectors: ComplexArray) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-    """Return real parts, signed imaginary parts, the partner of each in its pair, and the real basis of real and imaginary parts."""
+    """Return the eigenvectors of pairs in real form.
+
+    The result is real parts, signed imaginary parts, the partner of each, and the real basis.
+    """
     values, vectors = np.asarray(values, complex), np.asarray(vectors, complex)
     real, upper = np.flatnonzero(values.imag == 0.0), np.flatnonzero(values.imag > 0.0)
     first = np.arange(upper.size)
@@ -248,7 +257,10 @@ def _real_form(values: ComplexArray, vectors: ComplexArray) -> tuple[FloatArray,
 
 
 def _hyperbola() -> tuple[ComplexArray, ComplexArray]:
-    """Return nodes and weights, with the exponential, of two trapezoidal rules in the upper half plane; the real part of the sum counts."""
+    """Return nodes and weights of two trapezoidal rules in the upper half plane.
+
+    Weights include the exponential; the real part of the sum counts.
+    """
     at = np.concatenate([np.arange(NODES), np.arange(NODES) + 0.5])
     turned = 1j * STEP * at - ANGLE
     z = WIDTH * (1.0 + np.sin(turned))

@@ -1,4 +1,4 @@
-"""Monodromy matrix: matrix exponentials between located transitions, projections at transitions, impulses of sampled tangents.
+"""Monodromy matrix from matrix exponentials, projections at transitions, and impulses of sampled tangents.
 
 Laws without located transitions act by an impulse at each sample, with exact propagation between samples (the splitting
 of Strang 1968); the error is of second order in the step. The means of their tangents over the period are springs of
@@ -158,7 +158,10 @@ class _Kicks:
         self.before[:, :, size - 3 * n :] = np.eye(3 * n).reshape(n, 3, 3 * n)
 
     def advance(self, first: int, shares: FloatArray, step: FloatArray, states: FloatArray) -> FloatArray:
-        """Return the states after impulses at the samples from `first` on, and a step after each; `shares` are step lengths over the period."""
+        """Return the states after impulses at the samples from `first` on, and a step after each.
+
+        `shares` are step lengths over the period.
+        """
         if self.by_rate:
             for i, share in enumerate(shares, first):
                 self.kick(i, share, states)

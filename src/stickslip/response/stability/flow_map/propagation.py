@@ -113,7 +113,9 @@ def _series(a: FloatArray, rate: FloatArray, length: float) -> FloatArray:
 def _rational(
     a: FloatArray, powers: tuple[FloatArray, ...], part: float, columns: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the Padé approximants of order 13 of ``exp(part A)``, and of ``(exp(part A) - 1) / (part A)`` times the columns.
+    """Return the Padé approximants of order 13 of an exponential.
+
+    They are ``exp(part A)``, and ``(exp(part A) - 1) / (part A)`` times the columns.
 
     The `powers` are A², A⁴ and A⁶.
     """

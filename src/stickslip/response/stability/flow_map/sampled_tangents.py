@@ -113,7 +113,10 @@ def _turns(polynomial: FloatArray) -> FloatArray:
 
 
 class _Steps:
-    """Steps of one contact over a period, one to each sample, divided where a tangential gap reverses between two samples."""
+    """Steps of one contact over a period, one to each sample.
+
+    A step is divided where a tangential gap reverses between two samples.
+    """
 
     def __init__(self, law: ContactLaw, path: Path, j: int) -> None:
         self.law, self.parameters = law, np.asarray(law.parameters(), dtype=float)
@@ -137,7 +140,10 @@ class _Steps:
         self.share = (self.times - left) / (path.times[index] - left)
 
     def settled(self) -> tuple[FloatArray, FloatArray]:
-        """Return the (samples, 3 + s, 9 + s) tangents in the periodic state, NaN if a step is not finite, and this state."""
+        """Return the (samples, 3 + s, 9 + s) tangents in the periodic state, and this state.
+
+        Tangents are NaN if a step is not finite.
+        """
         state = np.array(self.law.initial_state(), dtype=float)
         if np.any(np.isnan(state)):
             state = self._period(state, len(self.times) - 1)[0]
@@ -161,7 +167,10 @@ class _Steps:
         return np.asarray(away > DISPLACED * float(np.max(np.abs(self.gap))))
 
     def _integrate(self, jac: FloatArray) -> None:
-        """Replace the tangents at samples by means over the steps: by the velocity, and for laws without states also by the gap."""
+        """Replace the tangents at samples by means over the steps.
+
+        This applies to derivatives by the velocity, and for laws without states also by the gap.
+        """
         columns = slice(0, 6) if not self.size else slice(3, 6)
         before = np.concatenate([[self.path.times[-1] - 2 * np.pi], self.times[:-1]])
         ends = np.column_stack([before, self.times])
@@ -222,7 +231,9 @@ def _fourier_basis(tau: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
 def _hat_integrals(
     tangents: Callable[[FloatArray, IntArray], FloatArray], ends: FloatArray, step: IntArray, samples: FloatArray
 ) -> FloatArray:
-    """Return means of tangents about each sample, with a weight that decreases linearly to zero at the neighbouring samples.
+    """Return weighted means of tangents about each sample.
+
+    The weight decreases linearly to zero at the neighbouring samples.
 
     A force much shorter than a step becomes two impulses with the same sum and mean time. Parts are halved until
     Simpson's rule converges.

@@ -65,7 +65,10 @@ class ContactTangent:
     known: dict[bytes, ComplexArray] = field(default_factory=dict)
 
     def matrix(self, sigma: complex, rows: IntArray, columns: IntArray) -> ComplexArray:
-        """Return the matrix (r m, c m) from the disturbance in the harmonics `columns` to the forces in the harmonics `rows`."""
+        """Return the (r m, c m) matrix from the disturbance to the forces.
+
+        Columns are the harmonics `columns` of the disturbance, rows the harmonics `rows` of the forces.
+        """
         m = self.ports.size
         held = self._held(sigma, rows).reshape(rows.size * m, -1)
         placed = self._placed(columns).reshape(-1, columns.size * m)
@@ -99,7 +102,10 @@ class ContactTangent:
         return out
 
     def _placed(self, harmonics: IntArray) -> ComplexArray:
-        """Return the (q, k, m) derivatives of slider positions at the beginning of stick, over ``e^{σ τ_0}``, by the disturbance's harmonics."""
+        """Return the (q, k, m) derivatives of slider positions at the beginning of stick, over ``e^{σ τ_0}``.
+
+        They are taken by the harmonics of the disturbance.
+        """
         rests, each = self.rests, np.arange(self.rests.own.size)
         turns = np.exp(1j * harmonics * rests.start[:, None])
         out = np.zeros((each.size, harmonics.size, self.ports.size), dtype=complex)

@@ -30,12 +30,14 @@ MAX_ROWS = 1300
 MIN_HARMONICS_OF_MANY_ROWS = 5
 # rows up to which harmonics are added until every mode resonates in one
 MAX_RINGING_ROWS = 400
-# rows up to which harmonics are doubled while higher ones matter, and added until every mode that contacts may destabilise resonates in one
+# rows up to which harmonics are doubled while higher ones matter,
+# and added until every mode that contacts may destabilise resonates in one
 MAX_DOUBLED_ROWS = 700
-# rows up to which all waves of a wheel are compared with the motion as solved; of larger wheels, the fastest growing waves
+# rows up to which all waves of a wheel are compared with the motion as solved; beyond, only the fastest growing ones
 MAX_ROWS_OF_COMPARED_WAVES = 700
 COMPARED_WAVES = 3
-# modulus over the largest, above which a multiplier counts as one of the largest; without comparison it takes the largest change of its group
+# modulus over the largest, above which a multiplier is one of the largest;
+# multipliers without a comparison take the largest change of their group
 NEAR_LARGEST_SHARE = 0.95
 # relative error of a multiplier from modes that resonate above all solved harmonics; measured 9e-5
 RINGING_ABOVE = 3e-4
@@ -80,7 +82,9 @@ class HillStability:
 
 @by_one_thread
 def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_kept) -> HillStability:
-    """Return the stability of a solved point of a forced response; for a tuned wheel, against disturbances of every wave.
+    """Return the stability of a solved point of a forced response.
+
+    For a tuned wheel the disturbances have every wave.
 
     As in `stability`, the multipliers belong to the motion with more harmonics, and their change is part of the errors.
     Structural damping and frequency-dependent aerodynamic coefficients act as in the balance.
@@ -126,7 +130,10 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint, keep: Keep = not_
 def _climbed(
     problem: ForcedProblem, point: ForcedPoint, hill: Hill, found: Exponents, first: HillStability, keep: Keep
 ) -> HillStability:
-    """Return the stability of the motion with about twice the harmonics; with four times as many if the verdict stays open."""
+    """Return the stability of the motion with about twice the harmonics.
+
+    If the verdict stays open, four times as many are used.
+    """
     system, best = problem.system.at(point.omega), first
     for more in islice(more_harmonics(problem, point), FURTHER_MOTIONS):
         if best.stability.settled:
@@ -172,7 +179,10 @@ def hill_exponents(system: System, gaps: ComplexArray, omega: float, order: int 
 
 
 def _refined(hill: Hill) -> tuple[Hill, Exponents]:
-    """Return the problem and its exponents with enough harmonics for convergence of the deciding exponent, if the limits allow."""
+    """Return the problem and its exponents with enough harmonics, if the limits allow.
+
+    The deciding exponent has then converged.
+    """
     found = exponents(hill)
     while True:
         deciding = np.max(found.errors[found.values.real > DECIDING_REAL_PART], initial=0.0)
@@ -225,7 +235,10 @@ def _prepared(
 
 
 def _order(hill: Hill, motion: int) -> int:
-    """Return the highest solved harmonic: if affordable, each mode, or each mode that may grow, resonates in a solved harmonic."""
+    """Return the highest solved harmonic.
+
+    If affordable, each mode, or each mode that may grow, resonates in a solved harmonic.
+    """
     ports = max(hill.side.ports.size, 1)
     ratios = hill.side.modes(0, 0).ratios
     least = min(max(HARMONICS_FACTOR * motion + HARMONICS_MORE, MIN_HILL_HARMONICS), MAX_HILL_HARMONICS)
@@ -238,7 +251,10 @@ def _order(hill: Hill, motion: int) -> int:
 
 
 def _changes(found: Exponents, solved: Hill) -> FloatArray:
-    """Return the change of each multiplier against the motion as solved; for a large wheel, estimated from a few waves."""
+    """Return the change of each multiplier against the motion as solved.
+
+    For a large wheel it is estimated from a few waves.
+    """
     waves = solved.side.waves
     if waves <= COMPARED_WAVES or solved.rows <= MAX_ROWS_OF_COMPARED_WAVES:
         return _distances(found, exponents(solved, segments_of(solved)), solved)
@@ -255,7 +271,10 @@ def _changes(found: Exponents, solved: Hill) -> FloatArray:
 
 
 def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
-    """Return the distance of each multiplier from the nearest other one of the same wave, for any shift of the harmonic."""
+    """Return the distance of each multiplier from the nearest other one of the same wave.
+
+    Any shift of the harmonic is allowed.
+    """
     own, theirs = found.multipliers, other.multipliers
     out = np.abs(own)  # a new multiplier counts as changed from zero
     for i, wave in enumerate(found.waves):

@@ -22,7 +22,9 @@ COUPLED = 1e-9  # coupling of modes, relative to the largest entry, that is roun
 
 @dataclass(frozen=True, eq=False)
 class HillModes:
-    """Modes ``u = Φ q`` of the structure of one harmonic, with ``Φᴴ(K + α M)Φ = 1``, scaled by the frequency of the motion.
+    """Modes ``u = Φ q`` of the structure of one harmonic, with ``Φᴴ(K + α M)Φ = 1``.
+
+    They are scaled by the frequency of the motion.
 
     Attributes
     ----------
@@ -59,7 +61,10 @@ class HillModes:
             return np.sqrt(np.abs(self.stiffness) / self.mass)
 
     def diagonal(self, z: complex, sign: float) -> ComplexArray | None:
-        """Return the (n,) dynamic stiffness at ``z = σ + ih`` without the part of `springs`; None if it is not diagonal."""
+        """Return the (n,) dynamic stiffness at ``z = σ + ih`` without the part of `springs`.
+
+        It is None if the stiffness is not diagonal.
+        """
         if self.damping.ndim == 2 or self.feedback is not None:
             return None
         more = z * self.damping + self.rest + 1j * sign * self.loss

@@ -31,7 +31,10 @@ Keep = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 
 
 def reach(side: HillSide, tangents: Sequence[ContactTangent]) -> float:
-    """Return the highest frequency of a mode that contacts can destabilise, over the frequency of the motion; 0 without such a mode."""
+    """Return the highest frequency of a mode that contacts can destabilise, over the frequency of the motion.
+
+    It is 0 without such a mode.
+    """
     if not tangents:
         return 0.0
     tops = (_top(side.modes(wave, 0), tangents) for wave in range(side.waves // 2 + 1))

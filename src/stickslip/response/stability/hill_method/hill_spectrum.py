@@ -91,7 +91,10 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
 
 
 def _confirmed(parts: list[Part]) -> list[Part]:
-    """Return the parts with only one exponent right of the axis: the fastest growing one that more harmonics confirm."""
+    """Return the parts with only one exponent right of the axis.
+
+    It is the fastest growing one that more harmonics confirm.
+    """
     growing = [(i, int(j)) for i, p in enumerate(parts) for j in np.flatnonzero(p.values.real > ON_AXIS)]
     growing.sort(key=lambda at: -parts[at[0]].values[at[1]].real)
     out = [p.taken(p.values.real <= ON_AXIS) for p in parts]
@@ -119,7 +122,10 @@ def segments_of(hill: Hill) -> list[Segment]:
 
 
 def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
-    """Return the number of exponents right of the imaginary axis, from the winding of the determinant along it; None if unknown."""
+    """Return the number of exponents right of the imaginary axis; None if unknown.
+
+    It follows from the winding of the determinant along the axis.
+    """
     if not all(segment.smooth for segment in axis) or not _rings(axis):
         return None
     each = [_turns(segment, zeros) for segment, zeros in zip(axis, found, strict=True)]
@@ -130,7 +136,7 @@ def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
 
 
 def _rings(axis: Sequence[Segment]) -> bool:
-    """Whether a mode resonates in a solved harmonic, and contacts can destabilise no mode above all solved harmonics."""
+    """Whether a mode resonates in a solved harmonic, and contacts destabilise none above all solved harmonics."""
     hill = axis[0].hill
     if not hill.tangents:
         return True
@@ -139,7 +145,10 @@ def _rings(axis: Sequence[Segment]) -> bool:
 
 
 def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
-    """Return the winding of the determinant along a segment relative to mean springs, and the number of growing exponents with mean springs."""
+    """Return the winding of the determinant along a segment, relative to mean springs.
+
+    The second result is the number of growing exponents with mean springs.
+    """
     whole, alone = _matrix(segment, "whole"), _matrix(segment, "alone")
     path = ON_AXIS + 1j * np.linspace(segment.low, segment.high, PATH)
     without = _raw(segment, "alone").values

@@ -55,10 +55,10 @@ class LawWork(NamedTuple):
     seen: FloatArray  # (3, 3 n) gap and rate of the iterate, force
     law: FloatArray  # (2, n_states) states after the step, and at closure
     status: IntArray  # (n + 1, 2); the last row at closure
-    jac: FloatArray  # for each contact (3 + s, 6 + s) derivatives by gap, rate and state, then (3 + s, 6) by initial gap and rate
+    jac: FloatArray  # by contact: (3 + s, 6 + s) by gap, rate and state, then (3 + s, 6) by initial gap and rate
     there: FloatArray  # derivatives at closure
     landed: IntArray  # (n,) whether the derivatives by initial gap and rate are used
-    place: FloatArray  # (5, 3): gap, rate and force at closure, change of the gap over the step, gradient of the normal force
+    place: FloatArray  # (5, 3): gap, rate and force at closure, change of the gap, gradient of the normal force
 
 
 @inner

@@ -39,7 +39,10 @@ MOST_STEPS = 8192  # in a period
 
 
 def step_work(coordinates: int, gaps: int) -> float:
-    """Estimate the floating-point operations of a step from the numbers of coordinates and gaps (three for each contact)."""
+    """Estimate the floating-point operations of a step from the numbers of coordinates and gaps.
+
+    A contact has three gaps.
+    """
     return STEP_FLOPS + 8.0 * coordinates**2 + float(gaps) ** 3
 
 
@@ -124,7 +127,9 @@ class Marcher:
         return self.steps * step_work(self.n, self.k)
 
     def turn(self, record: Record) -> float:
-        """Return the largest phase angle per step, rad, of the contacts that open or close in a record: contact frequency times step.
+        """Return the largest phase angle per step, rad, of the contacts that open or close in a record.
+
+        It is the contact frequency times the step.
 
         If it is large, the step does not resolve impacts; see `stickslip.response.time.stepping.marcher`.
         """
@@ -140,7 +145,10 @@ class Marcher:
         return self.begin(motion, np.concatenate([*states, np.zeros(0)]))[0]
 
     def begin(self, motion: FloatArray, law: FloatArray) -> tuple[StepState, FloatArray]:
-        """Return a state with the contact forces of its gaps, rates and law states (n_states,), and the derivatives of the laws."""
+        """Return a state with its contact forces, and the derivatives of the laws.
+
+        The forces follow from gaps, rates and law states (n_states,).
+        """
         seen = np.vstack([(self.modes.seen @ motion).reshape(2, self.k), np.zeros((1, self.k))])
         status = np.full((self.contacts.n, 2), -1)  # not open before
         state = StepState(np.concatenate([motion, np.zeros(self.k)]), seen, law.copy(), status)
@@ -165,7 +173,10 @@ class Marcher:
         return int(plan[FAILED])
 
     def march_logged(self, state: StepState, record: Record, use: Callable[[StepLog, int], None]) -> int:
-        """Integrate like `march`; pass the log of the laws' derivatives and its number of rows to `use` whenever it is full."""
+        """Integrate like `march`, and log the derivatives of the laws.
+
+        The log and its number of rows are passed to `use` whenever the log is full.
+        """
         steps, taken, failures = len(record.rows), 0, 0
         log = self._log(max(1, min(steps, LOG_NUMBERS // max(self.contacts.log_width, 1))))
         while taken < steps:

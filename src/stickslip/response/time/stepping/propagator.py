@@ -14,7 +14,8 @@ from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
 from stickslip.response.time.stepping.time_step import StepOperators
 
-# frequency of a contact spring with its effective mass over the load frequency, above which it is no part of the linear structure
+# frequency of a contact spring with its effective mass, over the load frequency;
+# above it the spring is no part of the linear structure
 FAST = 10.0
 
 COUPLED = 1e-12  # coupling of two modes in a step, below which it is rounding
@@ -104,7 +105,9 @@ def step_operators(
     steps: int,
     caller: str = "integrate",
 ) -> tuple[StepOperators, ModalCoordinates, FloatArray]:
-    """Return the matrices of a time step, their coordinates, and the springs (3 n_contacts,) in them; a period has `steps` steps.
+    """Return the matrices of a time step, their coordinates, and the springs (3 n_contacts,) in them.
+
+    A period has `steps` steps.
 
     Parameters
     ----------

@@ -100,7 +100,10 @@ def law_derivatives(rows: FloatArray, linear: TangentOperators, n_states: int) -
 
 
 def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
-    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of the initial state."""
+    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states.
+
+    They follow from the log of the initial state.
+    """
     (laws,) = law_derivatives(row[None], linear, n_states)
     k, m = linear.springs.size, linear.seen.shape[1]
     by_motion = laws.force @ linear.seen - linear.springs[:, None] * linear.seen[:k]

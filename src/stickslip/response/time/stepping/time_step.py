@@ -51,7 +51,7 @@ class StepOperators(NamedTuple):
     response: FloatArray  # (k, 2k), transposed: r at the end of the step -> gaps and rates
     gaps: FloatArray  # (k, m/2): displacements -> gaps
     rates: FloatArray  # (k, m/2): velocities -> rates of the gaps
-    turn: FloatArray  # (4, m/2): part of `transfer` for uncoupled modes: q by q and w, w by q and w; (0, m/2) for coupled modes
+    turn: FloatArray  # (4, m/2): `transfer` of uncoupled modes, q by q and w, w by q and w; (0, m/2) if coupled
 
 
 class StepLog(NamedTuple):
@@ -61,14 +61,17 @@ class StepLog(NamedTuple):
     steps: IntArray  # (rows,) number of successive steps
 
 
-# entries of a plan. Task: whether to evaluate the laws at the start, first step, number of steps, whether to fill the log.
+# entries of a plan. Task: whether to evaluate the laws first, first step, number of steps, whether to fill the log.
 # Result: steps taken, steps in which the contacts were not solved (-1: overflow), rows of the log
 BEGIN, FIRST, STEPS, LOGS, TAKEN, FAILED, ROWS = range(7)
 
 
 @inner
 def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
-    """Add ``matrixᵀ x`` to `out`, for as many columns as it has; at this size plain loops are faster than a threaded BLAS."""
+    """Add ``matrixᵀ x`` to `out`, for as many columns as it has.
+
+    At this size plain loops are faster than a threaded BLAS.
+    """
     whole = x.size - x.size % 4
     for j in range(0, whole, 4):
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
