@@ -4,7 +4,7 @@ A strategy of one's own
 
 Harmonics chosen by the contact forces that nothing balances.
 
-Run it as it is; nothing of the package is touched. It uses the layers below ``ss.Model``: a strategy sees the balance itself.
+Run it as it is; nothing of the package is touched.
 """
 
 from dataclasses import dataclass
@@ -39,19 +39,19 @@ class Unbalanced:
 
 if __name__ == "__main__":
     one = np.ones((1, 1))
-    structure = ss.model.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
-    friction = ss.Interface(("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]]))
-    system = ss.System(structure, friction, outputs=np.array([0]))
-    shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-    sweep = ss.Sweep(
-        omega_range=(0.1, 0.7), high=5, frequencies=13, peak_points=0, selection=Unbalanced()
-    )  # high="auto" would ask it only where there are fewest harmonics, and go its own way beyond
-    problem = ss.response.forced_problem(system, shaker, sweep)
-    solved = list(ss.forced_response(system, shaker, sweep))
-    points = ss.response.accepted_points(solved)
-    for point in points:
-        kept = ", ".join(str(h) for h in point.support)
-        blade = abs(ss.response.fields(problem, point).outputs[1, 0])  # point.coefficients: retained coordinates
-        print(f"{point.omega:.3f} rad/s: {blade:.4f} m with harmonics {kept}")
-    unknowns = sum(system.retained.size * (2 * len(point.support) - 1) for point in solved)
-    print(f"{unknowns} unknowns solved at {len(points)} frequencies")
+    blade = ss.Part(structure=ss.model.lumped(one, one, 0.02 * one, names=("tip",)))  # kg, N/m, N s/m
+    damper = ss.Contact(between=("blade.tip", "ground"), law=ss.Jenkins(k_t=0.5, limit=0.035), acts="tangential")
+    model = ss.Model(
+        parts={"blade": blade},
+        contacts={"damper": damper},
+        loads={"shaker": ss.Load(on="blade.tip", newton=0.1)},
+        outputs=(ss.Output(name="tip", on="blade.tip"),),
+    )
+    # high="auto" would ask it only where there are fewest harmonics, and go its own way beyond
+    hertz = tuple(np.linspace(0.1, 0.7, 13) / (2 * np.pi))
+    mine = model.forced_response(frequencies_hz=hertz, high=5, selection=Unbalanced(), stability="off")
+    data = mine["forced_response"]
+    for i, hz in enumerate(data.frequency_hz.values):
+        kept = ", ".join(str(h) for h in np.flatnonzero(data.harmonic_kept.values[i]))
+        print(f"{hz:.4f} Hz: {data.amplitude.values[i].max():.4f} m with harmonics {kept}")
+    print(f"{data.unknowns_solved.item():.0f} unknowns solved")

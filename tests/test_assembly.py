@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from newton_bounds import allowed, answer_at
 
+import stickslip as ss
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.forces import Load, Output
@@ -233,3 +234,27 @@ def test_what_is_wrong_with_a_model_is_named():
     refused("output.points.tip: there is no surface or set 'chain.tip'", outputs=(Output(name="tip", on="chain.tip"),))
     refused("alert_over: there is no place 'shaker.y'. Did you mean 'shaker.x'", alert_over=("shaker.y",))
     refused("join.a.between: needs two surfaces", joins={"a": Join(between=("chain.m1", "chain.m2"))})
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda: ss.Contact(between=("b.m", "ground"), law=ss.Jenkins(k_t=1.0, limit=1.0), acts="x"),
+            r"Contact\.acts: is 'x'",
+        ),
+        (
+            lambda: ss.Contact(between=("b.m", "ground"), law=ss.Jenkins(k_t=1.0, limit=1.0), share="all"),
+            r"Contact\.share: is 'all'",
+        ),
+        (
+            lambda: ss.Contact(between=("b.m", "ground"), law=ss.Jenkins(k_t=1.0, limit=1.0), pairing="node"),
+            r"Contact\.pairing: is 'node'",
+        ),
+        (lambda: ss.Join(between=("a.m", "b.m"), pairing="node"), r"Join\.pairing: is 'node'"),
+        (lambda: ss.Part(structure=ss.model.lumped(np.eye(1), np.eye(1)), cyclic="node"), r"Part\.cyclic: is 'node'"),
+    ],
+)
+def test_words_that_are_none_are_refused_with_those_that_are(make, said):
+    with pytest.raises(ss.InputError, match=said + r"\. Give one of "):
+        make()

@@ -498,8 +498,8 @@ def test_example_of_an_own_strategy():
     script = Path(__file__).parents[1] / "examples" / "own_strategy.py"
     ended = subprocess.run([sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
-    rows = re.findall(r"([\d.]+) rad/s: ([\d.]+) m with harmonics (.*)", ended.stdout)
-    for omega, amplitude in [(float(w), float(a)) for w, a, _ in rows[:4]]:
+    rows = re.findall(r"([\d.]+) Hz: ([\d.]+) m with harmonics (.*)", ended.stdout)
+    for omega, amplitude in [(2.0 * np.pi * float(f), float(a)) for f, a, _ in rows[:4]]:
         # below 0.07 m the damper is a spring and nothing else; printed to four decimals
         exact = abs(0.1 / (1.5 - omega**2 + 0.02j * omega))
         assert amplitude == pytest.approx(exact, abs=6e-5)

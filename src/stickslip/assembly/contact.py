@@ -1,16 +1,17 @@
 """Contacts between named surfaces."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from stickslip.contact.law import ContactLaw
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 
 GROUND = "ground"
 NEXT = "next."  # prefix of a surface of the neighbouring sector, in the sense of rotation
 PairingKind = Literal["node_to_node", "node_to_segment", "segment_to_segment"]
 SPATIAL: Literal["spatial_harmonics"] = "spatial_harmonics"  # join of wheels with different numbers of sectors
 Share = Literal["interface", "point", "area"]
+Acts = Literal["tangential", "normal"]
 # remedy in messages about stages that such a join couples
 ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."
 
@@ -47,6 +48,11 @@ class Contact:
         Clearance at rest, m. A negative value is an interference, the overlap of the undeformed bodies.
     preload
         Normal force at rest for the unit of `share`, N or Pa.
+
+    Raises
+    ------
+    InputError
+        If `share`, `pairing` or `acts` is no known word.
     """
 
     between: tuple[str, str]
@@ -55,10 +61,16 @@ class Contact:
     pairing: PairingKind = "node_to_node"
     tangent: tuple[float, float, float] | None = None
     normal: tuple[float, float, float] | None = None
-    acts: Literal["tangential", "normal"] | None = None
+    acts: Acts | None = None
     tolerance: float | None = None
     gap: float = 0.0
     preload: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_choice("Contact.share", self.share, get_args(Share))
+        check_choice("Contact.pairing", self.pairing, get_args(PairingKind))
+        if self.acts is not None:
+            check_choice("Contact.acts", self.acts, get_args(Acts))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,7 +87,7 @@ class Join:
     Raises
     ------
     InputError
-        If harmonics are missing, or given with another pairing.
+        If `pairing` is no known word; if harmonics are missing, or given with another pairing.
     """
 
     between: tuple[str, str]
@@ -84,6 +96,7 @@ class Join:
     harmonics: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
+        check_choice("Join.pairing", self.pairing, (*get_args(PairingKind), SPATIAL))
         if bool(self.harmonics) != (self.pairing == SPATIAL) or min(self.harmonics, default=0) < 0:
             raise input_error(
                 "Join.harmonics",

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, st
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, joined_displacements, static_state
 from stickslip.contact.law import check_law_members, held_stiffness
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
 from stickslip.model.facts import Facts, facts_of_parts, other_speeds, unlike_units
@@ -36,6 +36,7 @@ from stickslip.reduction.waves import wave
 from stickslip.response.forced.choices import AmplitudeOf
 
 ContactsAs = Literal["static", "stuck", "open"]
+TangentAtSpeed = Literal["consistent", "textbook"]
 
 
 def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
@@ -113,7 +114,7 @@ class Model:
     amplitude_of: AmplitudeOf = "first"
     alert_over: tuple[str, ...] = ()
     speed: float = 0.0
-    tangent: Literal["consistent", "textbook"] = "consistent"
+    tangent: TangentAtSpeed = "consistent"
     coriolis: bool = False
     centrifugal: bool = True
     interface_modes: int | None = None
@@ -125,6 +126,8 @@ class Model:
     def __post_init__(self) -> None:
         if not self.parts:
             raise input_error("part", "there is none", "Give a model at least one part.")
+        check_choice("Model.amplitude_of", self.amplitude_of, get_args(AmplitudeOf))
+        check_choice("Model.tangent", self.tangent, get_args(TangentAtSpeed))
         for name, contact in self.contacts.items():
             check_law_members(f"contact.{name}.law", contact.law)
         for name, one in (("aero", self.aerodynamics), ("mistuning", self.mistuning)):

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.fe.elements import EXACT, Quadrature
@@ -21,6 +21,7 @@ from stickslip.model.rigid.solids import BodySolid, from_faces, prism
 from stickslip.model.structure import Structure
 
 FACES = ("cyclic_low", "cyclic_high")
+CyclicTie = Literal["node_to_node", "segment_to_segment"]
 Damper = FlatCurvedDamper | WedgeDamper | CylinderDamper
 Z_AXIS = Axis()
 
@@ -169,6 +170,11 @@ class Part:
         Names of sets whose nodes are all clamped, so that nothing can act on them.
     own_speed
         Speed in the part's file, rad/s; 0: the file has none. All parts of a model have the same speed.
+
+    Raises
+    ------
+    InputError
+        If `cyclic` is no known word.
     """
 
     structure: Structure
@@ -179,7 +185,7 @@ class Part:
     drawn: BodySolid | None = None
     sectors: int = 1
     faces: tuple[str, str] = FACES
-    cyclic: Literal["node_to_node", "segment_to_segment"] = "node_to_node"
+    cyclic: CyclicTie = "node_to_node"
     axis: Axis = field(default_factory=Axis)
     reduction: Reducing | None = None
     damping: Damping | None = None
@@ -189,6 +195,9 @@ class Part:
     clamped_sets: tuple[str, ...] = ()
     own_speed: float = 0.0
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # reductions already computed
+
+    def __post_init__(self) -> None:
+        check_choice("Part.cyclic", self.cyclic, get_args(CyclicTie))
 
     def __repr__(self) -> str:
         """Describe the part in a line."""
