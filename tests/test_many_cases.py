@@ -8,6 +8,7 @@ import xarray as xr
 from synthetic_result import synthetic_result, tree_of
 
 import stickslip as ss
+from stickslip.analyses.forced_response.page.at_peak.bodies import energy
 from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.many_cases import FEW, MOST_IN_PANELS, extremes, panels
@@ -172,3 +173,4 @@ def test_the_answer_says_where_friction_does_nothing_and_where_no_case_differs()
     told = cards(Response(still))[0]
     assert "Friction dissipates nothing at any peak" in told.note
     assert "Next: press the contacts less" in told.note
+    assert energy(Response(still)) is None  # no empty axes

@@ -634,7 +634,7 @@ PARTIAL = {
     "no peaks": (_no_peaks, {"loops", "the damper", "optimisation"}),
     "one harmonic": (_one_harmonic, {"the prediction"}),
     "nothing flagged": (_nothing_flagged, set()),
-    "nothing converged": (_nothing_converged, {"the response", "loops", "the damper", "optimisation"}),
+    "nothing converged": (_nothing_converged, {"the response", "loops", "energy", "the damper", "optimisation"}),
     "no predicted error": (_without("predicted"), {"where more was needed", "the prediction"}),
     "one case done": (_only_first_case_done, {"optimisation", "the prediction"}),
     "no mesh": (_without("surface"), {"the mesh", "contact points"}),

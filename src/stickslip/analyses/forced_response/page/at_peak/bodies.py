@@ -162,12 +162,14 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
 
 
 def energy(response: Response) -> Plot | None:
-    """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency."""
+    """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency. Return None if there is none."""
     values = response.fields.dissipated_energy
     if not np.isfinite(values).any():
         return None
     total = np.where(response.converged, np.nansum(values, axis=1), np.nan)
     total = np.where(total < _NOTHING, 0.0, total)
+    if not np.any(total > 0.0):
+        return None  # the answer says that friction dissipates nothing
     values = np.where(np.abs(values) < _NOTHING, 0.0, values)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")
     _, over, unit = abscissa(response)
