@@ -159,6 +159,18 @@ def test_peaks_under_different_loads_are_not_set_against_each_other(pair: Compar
     assert np.isnan(ss.compare(*designs, names=("a", "b")).peaks["against the first (%)"]).all()
 
 
+def test_the_head_has_the_cost_where_harmonics_are_chosen_differently() -> None:
+    designs = [design((50,), 1.0, 0.6), design((50,), 1.0, 0.6)]
+    for own, selection, unknowns in zip(designs, ("always_high", "guarded_alert"), (900, 450), strict=True):
+        data = own.data["forced_response"].to_dataset()
+        data.attrs["selection"] = selection
+        own.data["forced_response"] = data.assign(unknowns_solved=("case", [unknowns]))
+    told = [card.note for card in cards(ss.compare(*designs, names=("a", "b")).designs, divided=True)]
+    assert [note.rpartition("; ")[2] for note in told] == ["900 unknowns solved", "450 unknowns solved"]
+    same = [card.note for card in cards(ss.compare(designs[0], designs[0], names=("a", "b")).designs, divided=True)]
+    assert not any("unknowns" in note for note in same)
+
+
 def test_cases_are_paired_by_what_is_varied_whatever_their_names_are() -> None:
     one, other = design((50, 5), 1.0, 0.6), design((50, 5), 1.2, 0.6)
     data = other.data["forced_response"].to_dataset()

@@ -34,6 +34,7 @@ from stickslip.report.section import Card, Content
 from stickslip.study.verdict import POINT_LEVELS, UNSTABLE, conclusion
 
 _BEST = "best of each"
+_CHOICE = ("selection", "high_order", "passages")  # attributes that say how harmonics were chosen
 _DASHES = ("dash", "dot", "dashdot", "longdash")
 _MOST_INPUTS = 400  # characters of a value that a cell shows
 _SYMBOLS = {"trusted": "circle", "doubtful": "circle-open", "wrong": "x", UNSTABLE: "circle-open-dot"}
@@ -411,9 +412,10 @@ def cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
 
 
 def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: str, *, divided: bool) -> list[Card]:
-    """Return a card for each design at a case, compared with the first design."""
+    """Return a card for each design at a case, compared with the first design, with its cost where harmonics are chosen differently."""
     found: list[Card] = []
     first, against, loaded = float("nan"), "", float("nan")
+    costed = len({tuple(str(d.response.data.attrs.get(k)) for k in _CHOICE) for d, _ in pairs if d.response}) > 1
     for design, case in pairs:
         response = design.response
         if case is None or response is None:
@@ -428,6 +430,9 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
             off = over_first(height, first)
             how = f"{percent(abs(off), 3)} {'more' if off > 0 else 'less'} than" if off else "equal to the"
             note += f"; {how} {against}"
+        unknowns = dict(zip(response.cases, response.numbers_of, strict=True))[case].unknowns_solved
+        if costed and unknowns >= 0:
+            note += f"; {counted(unknowns, 'unknown')} solved"
         found.append(Card(quantity(height, unit), label.format(design.name), note))
     return found
 
