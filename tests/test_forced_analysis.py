@@ -445,7 +445,7 @@ def drifting(retention: float) -> Question:
     load = HarmonicLoad(np.zeros(2), {1: np.array([1.0 + 0j, 0.0])})
     sweep = Sweep(omega_range=(8.0, 12.0), low=1, high=3, points=8, peak_points=4, samples=64)
     held = bare.with_retention(retention)
-    return question(held, load, sweep, model={"bare": bare, "retention": retention})
+    return question(held, load, sweep, examine="off", model={"bare": bare, "retention": retention})
 
 
 def test_body_that_may_drift_is_told_and_retention_is_judged() -> None:

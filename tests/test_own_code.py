@@ -225,14 +225,14 @@ def test_a_strategy_from_a_file_answers_as_its_object_does(tmp_path: Path) -> No
 def test_changed_code_is_told_and_computed_anew(tmp_path: Path) -> None:
     paths = list(sys.path)
     study = write(tmp_path, read_by("parts:read"))
-    assert invoke("run", study, "--allow-code").exit_code == 0
+    assert invoke("run", study, "--allow-code", "--no-report").exit_code == 0
     first = peak(tmp_path)
-    assert "jobs to do: 0" in said(invoke("run", study, "--allow-code"))
+    assert "jobs to do: 0" in said(invoke("run", study, "--allow-code", "--no-report"))
     (tmp_path / "factors.py").write_text("FACTOR = 1.2\n")  # which parts.py imports
     refused = invoke("run", study, "--allow-code")
     assert "factors.py has changed since this Python imported it. Start Python again." in said(refused)
     forget(paths)
-    again = invoke("run", study, "--allow-code")
+    again = invoke("run", study, "--allow-code", "--no-report")
     assert "factors.py has changed since the last run here: nothing of that run is used" in said(again)
     assert "jobs to do: 1" in said(again)
     assert abs(peak(tmp_path) / first - 1) > 0.01
@@ -240,9 +240,9 @@ def test_changed_code_is_told_and_computed_anew(tmp_path: Path) -> None:
 
 def test_a_reader_and_a_reduction_of_ones_own_give_what_built_in_ones_give(tmp_path: Path) -> None:
     usual, own = tmp_path / "usual", tmp_path / "own"
-    assert invoke("run", write(usual)).exit_code == 0
+    assert invoke("run", write(usual), "--no-report").exit_code == 0
     reduced = ("\\[contact.friction\\]", '[reduction]\nmethod = "parts:Static"\n[contact.friction]')
-    done = invoke("run", write(own, read_by("parts:read"), reduced), "--allow-code")
+    done = invoke("run", write(own, read_by("parts:read"), reduced), "--allow-code", "--no-report")
     assert done.exit_code == 0, done.output
     assert "own code: factors.py" in said(done)
     # one mode beside the tip is all of two masses: the same motion in other coordinates, solved to 1e-8
@@ -252,7 +252,7 @@ def test_a_reader_and_a_reduction_of_ones_own_give_what_built_in_ones_give(tmp_p
 def test_a_law_from_a_file_answers_as_the_built_in_one_and_workers_find_it(tmp_path: Path) -> None:
     usual, own = tmp_path / "usual", tmp_path / "own"
     events = ("\\[load.shaker\\]", '[solver]\nevaluator = "intervals"\n[load.shaker]')
-    assert invoke("run", write(usual, events)).exit_code == 0
+    assert invoke("run", write(usual, events), "--no-report").exit_code == 0
     law = (
         'law = "jenkins"(.|\n)*?slip_limit_n = 0.6',
         'law = "own_law:RateJenkins"\nparameters = { k_t = 4e3, limit = 0.6, per_velocity = 0.0 }',
@@ -260,7 +260,7 @@ def test_a_law_from_a_file_answers_as_the_built_in_one_and_workers_find_it(tmp_p
     vary = ("\\[forced_response\\]", "[vary]\ncontact.friction.parameters.per_velocity = [0.0, 2.0]\n[forced_response]")
     study = write(own, events, law, vary)
     shutil.copy(EXAMPLES / "own_law.py", own)
-    done = invoke("run", study, "--allow-code", "--workers", "2")
+    done = invoke("run", study, "--allow-code", "--workers", "2", "--no-report")
     assert done.exit_code == 0, done.output
     sizes = ss.Result.from_file(own / "results")["forced_response"].peak_amplitude.values
     assert sizes[0] == pytest.approx(peak(usual), rel=1e-6)
