@@ -311,7 +311,7 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
 
 
 def test_two_blades_answer_and_can_be_read_without_this_package(tmp_path: Path) -> None:
-    few = {"forced_response.points": "4", "forced_response.stability": '"off"'}
+    few = {"forced_response.points": "4", "forced_response.stability": '"off"', "reduction.fixed_interface_modes": "6"}
     path = write_two_blades(tmp_path, {"vary.load.shaker.ratio": "[2000, 1000]"} | few)
     said = done("run", str(path), "--workers", "2")
     assert "ratio 1000" in said
