@@ -33,6 +33,7 @@ from stickslip.analyses.residual_tractions.records import TractionRecord
 from stickslip.analyses.resonance.analysis import RESONANCE
 from stickslip.analyses.run_up import records as of_run_up
 from stickslip.analyses.run_up.analysis import RUN_UP
+from stickslip.analyses.run_up.page import RunUpView, fast, fast_peaks
 from stickslip.analyses.run_up.records import (
     OPEN,
     SLIP,
@@ -59,6 +60,7 @@ from stickslip.study.analysis import named
 from stickslip.study.models.measured import MeasuredPeaks, Quantity
 from stickslip.study.questions import ANALYSES
 from stickslip.study.store.archive import flat
+from stickslip.study.store.netcdf import one_case
 from stickslip.units import DEG, HZ, RPM
 
 NAN = np.nan
@@ -770,6 +772,16 @@ def test_run_ups() -> None:
         static_speed_rpm=[1000.0, 2000.0, 3000.0],
     )
     assert data["fast_rate_rpm_per_s"].attrs["units"] == "rpm/s"
+    named = replace(found, points=(run_up_point(0.5),) * 12, output_label=("tip.x",))
+    view = RunUpView(one_case(RUN_UP.dataset(solved([], {of_run_up.FOUND: flat(named)})), 0))
+    table, plot = fast_peaks(view), fast(view)
+    assert table is not None
+    assert plot is not None
+    assert [row[2:] for row in table.rows] == [
+        ["3 mm", "1.5", "1\u202f100", "−100", "1 %"],
+        ["1.5 mm", "0.75", "1\u202f250", "50", "2 %"],
+    ]
+    assert "the smallest peak is 75 % of the steady one" in plot.caption
 
 
 def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
