@@ -35,7 +35,7 @@ def result() -> Result:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    tree = tree_of(provenance(), forced_response=synthetic_result(ratios=(20, 5), n=12))
+    tree = tree_of(provenance(), forced_response=synthetic_result(ratios=(5,), n=12))
     return write_result(tree, tmp_path_factory.mktemp("run") / "result.nc")
 
 

@@ -22,8 +22,8 @@ from stickslip.study.store.netcdf import one_case
 KEYS = {
     "vary.load.shaker.force_n": "[2.0, 3.0, 5.0]",
     "forced_response.frequency_hz": "[11.0, 15.0]",
-    "forced_response.points": "8",
-    "forced_response.peak_points": "3",
+    "forced_response.points": "5",
+    "forced_response.peak_points": "1",
     "forced_response.stability": '"off"',
     "harmonics.high": "3",
 }

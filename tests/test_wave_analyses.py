@@ -412,12 +412,12 @@ def test_contacts_are_springs_or_nothing(tmp_path: Path) -> None:
     """Two blades and a damper, as a whole: the damper is held where contacts stick, and left out where they are open."""
     asked = {"modes.number": "4", "modes.shapes": "false"}
     found = {}
+    made = read_study(write_two_blades(tmp_path, asked | {"modes.contacts": '"open"'}))
     for how in ("open", "static", "stuck"):
-        path = write_two_blades(tmp_path / how, asked | {"modes.contacts": f'"{how}"'})
-        data = node(read_study(path), "modes")
+        data = node(made.replace({"modes.contacts": how}), "modes")  # of one mesh
         assert data.attrs["contacts"] == how
         found[how] = data.frequency_hz.values[0]
-    model = read_study(path).model()
+    model = made.model()
     free = model.at(0.0, 0, "open")
     np.testing.assert_allclose(found["open"], normal_modes(free, 4).frequencies_hz, rtol=1e-9)
     assert "damper" not in free.dofs.part
