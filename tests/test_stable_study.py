@@ -50,6 +50,7 @@ from stickslip.response.stability.found import Floquet
 from stickslip.response.stability.settled import Settled
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
+from stickslip.study.analysis import Solved
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ
 
@@ -95,6 +96,13 @@ def undecided(monkeypatch: pytest.MonkeyPatch) -> Question:
 
     monkeypatch.setattr(stable, "settled_stability", rough)
     return lifted(omega_range=(1.29, 1.6), direction="down", low=1, high=1, points=12)
+
+
+@pytest.fixture(scope="module")
+def decided_in_time() -> Solved:
+    """What comes of that flank, for tests that look at it."""
+    with pytest.MonkeyPatch.context() as patch:
+        return solved(undecided(patch))
 
 
 def test_the_branch_between_two_folds_is_unstable_and_no_other() -> None:
@@ -153,8 +161,8 @@ def test_a_peak_under_friction_is_stable_and_attained() -> None:
     assert "attained" in check.sentence
 
 
-def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = dataset(solved(undecided(monkeypatch)))
+def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(decided_in_time: Solved) -> None:
+    data = dataset(decided_in_time)
     peak = at_peak(data)
     # the peak is integrated, and others; neighbours on the branch with the same transitions follow from them
     assert set(data.stability_verdict.values.tolist()) <= {"stable", "undecided"}
@@ -186,9 +194,8 @@ def test_a_large_model_stays_undecided_and_names_the_check(monkeypatch: pytest.M
     assert "an undecided point stays so without --verify" in "; ".join(cost_lines(asked))
 
 
-def test_nothing_is_examined_or_integrated_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = undecided(monkeypatch)
-    whole = solved(asked)
+def test_nothing_is_examined_or_integrated_twice(decided_in_time: Solved, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, whole = undecided(monkeypatch), decided_in_time
     first = dataset(whole)
     times: list[str] = []
     monkeypatch.setattr(with_stability, "examine", lambda *_: times.append("examined"))
