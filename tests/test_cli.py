@@ -158,6 +158,18 @@ def with_few_cases(path: Path) -> None:
     path.write_text(head + table + re.sub(r"\[([^],\n]+)(?:, [^],\n]+)*(, [^],\n]+)\]", r"[\1\2]", rest, count=1))
 
 
+def test_the_second_table_of_vary_in_the_damper_is_taken_as_it_stands(tmp_path: Path) -> None:
+    done("new", str(tmp_path / "made"), "--kind", "damper")
+    path = tmp_path / "made" / "study.toml"
+    path.write_text(re.sub(r"^# (\[\[vary\]\]|contact\.)", r"\1", path.read_text(), flags=re.MULTILINE))
+    assert len(stickslip.Study.from_file(path).cases) == 10
+
+
+@pytest.mark.parametrize("name", ["vary", "title"])
+def test_keys_without_a_table_of_their_own_are_told(name: str) -> None:
+    assert name in done("keys", name)
+
+
 # the other kinds are examples of the repository, which tests/test_journeys.py or others go through
 @pytest.mark.parametrize("kind", ["own_blades", "damper", "wheel", "mistuned"])
 def test_check_passes_what_new_writes(tmp_path: Path, kind: str) -> None:

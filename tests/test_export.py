@@ -278,7 +278,9 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
     folder, result, _model = beams
     with pytest.raises(InputError, match=r"goes from .* to .* Hz"):
         result.export(hz=5.0)
-    with pytest.raises(InputError, match=r"export: 'modes' cannot be written: .*\[limit_cycle\]; this result has \[forced_response\]"):
+    with pytest.raises(
+        InputError, match=r"export: 'modes' cannot be written: .*\[limit_cycle\]; this result has \[forced_response\]"
+    ):
         result.export(analysis="modes")
     with pytest.raises(InputError, match="points of a forced response are picked by"):
         result.export(amplitude_mm=1.0)

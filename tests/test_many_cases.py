@@ -1,5 +1,6 @@
 """Studies of many cases on the page: families of cases, panels, a map of all peaks, parallel axes, an idle damper."""
 
+import re
 from itertools import product
 
 import numpy as np
@@ -164,6 +165,20 @@ def test_designs_of_many_curves_are_compared_by_a_map_of_differences() -> None:
     (cells,) = found.plot("compared_optimisation").data
     off = np.array([[cells.z[m][f] for m in range(10)] for f in range(3)]).ravel()  # in the order of the study
     np.testing.assert_allclose(off, 100 * (np.linspace(0.9, 1.2, 30) - 1), atol=1e-9)
+
+
+def test_the_answer_has_the_value_that_is_best_in_the_worst_of_all_curves() -> None:
+    data = grid(5, 3)
+    response = Response(data)
+    peaks = np.array([response.peak_response(c) for c in response.cases]).reshape(5, 3)
+    worst = peaks.max(axis=1)
+    best, over = int(worst.argmin()), 100 * (worst.min() / peaks.min() - 1)
+    note = cards(response)[0].note
+    told = re.search(r"In the worst of 3 curves force (\d) N is best: [^,]+(?:, [a-z ]+)?, ([\d.]+) % above", note)
+    assert told is not None
+    assert int(told[1]) == best + 1
+    assert float(told[2]) == pytest.approx(over, rel=0.01)
+    assert "In the worst of" not in cards(Response(grid(5, 1)))[0].note
 
 
 def test_the_answer_says_where_friction_does_nothing_and_where_no_case_differs() -> None:

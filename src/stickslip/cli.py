@@ -25,6 +25,9 @@ from stickslip.api.screen import Screen, on_screen
 from stickslip.errors import InputError, StickslipError, input_error
 
 FILES_TOLD = 4  # files of an export that are listed
+MANY_CASES = (
+    12  # of a study, whose page takes more than some 20 s to write: measured with 33 cases, 62 s beside other programs
+)
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
@@ -131,6 +134,8 @@ def run(
         from stickslip.api.result import result_of
 
         result = result_of(outcome)
+        if report and len(content.cases) > MANY_CASES:
+            typer.echo(f"writing the page of {len(content.cases)} cases")
         files = [*result.files, *([result.report()] if report else [])]
         from stickslip.study.verdict import in_lines, stored
 

@@ -55,6 +55,8 @@ def table_keys(name: str) -> list[Keys]:
     below = entry.get("additionalProperties")
     title = f"{table}.{_ANY_NAME}" if isinstance(below, dict) else table
     found = dict(_kinds(schema, below if isinstance(below, dict) else entry))
+    if not found:  # a single value, or [vary], whose keys are those of all tables
+        return [Keys("A study file", ((table, "", entry.get("description", "")),))]
     if table == "contact":
         return [_of_contact(title, found[""], kind)]
     if kind and kind not in found:

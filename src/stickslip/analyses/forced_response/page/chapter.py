@@ -1,5 +1,7 @@
 """Forced responses on the page: the numbers at its head, the table of cases, and the order of all figures and tables."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from stickslip.analyses.forced_response.page.at_peak.bodies import bodies, energy
@@ -52,6 +54,7 @@ from stickslip.report.quantities import (
     quantity,
 )
 from stickslip.report.section import Block, Card, Section
+from stickslip.study.varied import key_name
 from stickslip.study.verdict import LEVELS
 
 _ALIKE = 0.01  # largest difference of equal peaks, relative to the largest peak
@@ -79,6 +82,7 @@ def _answer(response: Response) -> Card:
         alike = f", and none is {percent(100 * _ALIKE)} larger" * (share > 1 - _ALIKE)
         label = f"with {best.label}, the smallest {kind} of {which}{counted(len(counted_in), 'case')}{alike}"
         told.append(f"{ratio}{percent(100 * float(share))} of the largest, {response.peak_is(best)}")
+        told += _smallest_worst(response, peaks, best)
     idle = all(loss_at_peak(Curve(response.data, c.index)) == 0 for c in counted_in)
     if idle:
         told.append(f"Friction dissipates nothing at {'any' if len(counted_in) > 1 else 'the'} peak")
@@ -91,6 +95,30 @@ def _answer(response: Response) -> Card:
         told.append(f"{_size(response, lower)} is {response.level(lower)}{lower.where}")
     value = f"{_size(response, best)} at {response.place(best)}{response.blade_at_peak(best)}"
     return Card(value, label, ". ".join([*told, *_next(response, best, idle=idle)]) + ".")
+
+
+def _smallest_worst(response: Response, peaks: Mapping[ShownCase, float], best: ShownCase) -> list[str]:
+    """Return the value of the first varied number whose worst peak over all curves is smallest; nothing for a single curve.
+
+    The other varied keys may be uncertain, such as a friction coefficient, or several loads, so that none of their values can be chosen.
+    """
+    key = first_number(response.data)[0]
+    curves = families_of(response.data, key, list(peaks)) if key else {}
+    if len(curves) < 2:
+        return []
+    of_values: dict[float, list[ShownCase]] = {}
+    for case in (c for curve in curves.values() for c in curve):
+        of_values.setdefault(case.value, []).append(case)
+    worst = [max(own, key=lambda c: peaks[c]) for own in of_values.values() if len(own) == len(curves)]
+    if not worst:
+        return []
+    least = min(worst, key=lambda c: peaks[c])
+    word, unit = key_name(response.data, key)
+    named = " ".join(filter(None, (word, number(least.value), unit)))
+    level = f", {response.level(least)}" if response.trust(least) else ""
+    size = f"{amplitude(peaks[least], response.unit)}{level}"
+    over = percent(100 * (peaks[least] / peaks[best] - 1.0))
+    return [f"In the worst of {len(curves)} curves {named} is best: {size}, {over} above the smallest"]
 
 
 def _size(response: Response, case: ShownCase) -> str:
