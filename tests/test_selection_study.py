@@ -36,7 +36,6 @@ SLIPPING = {
     "forced_response.peak_points": "0",
     "forced_response.frequencies": "2",
     "forced_response.stability": '"off"',
-    "reduction.fixed_interface_modes": "6",
 }
 DECIDE = tuple(name for name in SELECTIONS if always_kept(strategy_named(name)) is None)
 ALONE = tuple(name for name in DECIDE if not strategy_named(name).verifies)
