@@ -332,3 +332,12 @@ def test_time_integration_of_a_point_beside_the_peak_doubts_that_point_alone() -
         told = data.assign({f"not_periodic_{k}": ("not_periodic", [v]) for k, v in row.items()})
         (found,) = not_periodic(Curve(told, 0))
         assert (found.level, list(found.points)) == ("doubtful", hit)
+
+
+def test_one_linear_peak_at_an_end_is_where_contacts_stick() -> None:
+    """Only the very first or last peak is linear: the end is known from it alone, whatever is varied."""
+    linear, slips = ContactsAtPeak(1.0, True, True), ContactsAtPeak(0.5, False, False)
+    peaks = curve((1.0, 3.0, linear), (2.0, 2.0, slips), (3.0, 1.0, slips), (4.0, 2.0, slips))
+    assert sticks_at(peaks, "part.blades.pitch_m") == "low"
+    turned = [replace(p, value=5.0 - p.value) for p in peaks[::-1]]
+    assert sticks_at(turned, "part.blades.pitch_m") == "high"
