@@ -10,10 +10,14 @@ from stickslip.analyses.forced_response.page.many_cases import FEW, extremes
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import CASE, ShownCase
+from stickslip.report.content import Words
 from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+ENERGY = "Energy dissipated in a cycle"
+_STILL = "At the peak nothing is dissipated: no point slips."
+_NO_POINT = "No point dissipates energy at any frequency."
 _NOTHING = 1e-12  # J a cycle: rounding error of newtons times micrometres
 _AXIS_LINES = (
     {"color": "#0072b2", "dash": "solid", "width": 2},
@@ -122,7 +126,7 @@ def _energy_caption(response: Response, case: ShownCase) -> str:
     energy = response.fields.dissipated_energy[response.peak(case)]
     total = float(np.nansum(energy))
     if total <= _NOTHING:
-        return "At the peak nothing is dissipated: every point sticks."
+        return _STILL
     most = int(np.nanargmax(energy))
     text = f"At the peak {quantity(total, 'J')} are lost in a cycle by the contacts{response.of_sector}, {percent(100 * float(energy[most]) / total)} of it at {names[most]}"
     shares = {g: 100 * float(np.nansum(energy[at])) / total for g, at in response.groups.items()}
@@ -161,15 +165,15 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
         figure.add_trace(curve.update(showlegend=len(response.cases) > 1), 1, 2)
 
 
-def energy(response: Response) -> Plot | None:
-    """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency. Return None if there is none."""
+def energy(response: Response) -> Plot | Words | None:
+    """Draw the energy dissipated per cycle: by contact at the peak, in total against frequency; a sentence if there is none."""
     values = response.fields.dissipated_energy
     if not np.isfinite(values).any():
         return None
     total = np.where(response.converged, np.nansum(values, axis=1), np.nan)
     total = np.where(total < _NOTHING, 0.0, total)
-    if not np.any(total > 0.0):
-        return None  # the answer says that friction dissipates nothing
+    if not np.any(total > 0.0):  # no empty axes
+        return Words([_STILL, _NO_POINT], ENERGY) if np.isfinite(total).any() else None
     values = np.where(np.abs(values) < _NOTHING, 0.0, values)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")
     _, over, unit = abscissa(response)
@@ -192,8 +196,7 @@ def energy(response: Response) -> Plot | None:
     told = Markup("Work of the friction forces in one cycle. Left: coloured by contact ({}). {}{}")
     caption = told.format(key, named, _widest_range(response, total))
     captions = {c.index: _energy_caption(response, c) for c in response.peaked}
-    title = "Energy dissipated in a cycle"
-    return Plot("energy", title, caption, figure, captions, response.chosen)
+    return Plot("energy", ENERGY, caption, figure, captions, response.chosen)
 
 
 def _widest_range(response: Response, total: FloatArray) -> str:
@@ -205,7 +208,7 @@ def _widest_range(response: Response, total: FloatArray) -> str:
         lossy = x[at][np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))]
         widths.append(float(np.ptp(lossy)) if lossy.size else 0.0)
     if not any(widths):
-        return "No point dissipates energy."
+        return _NO_POINT
     widest = int(np.argmax(widths))
     return (
         f"Friction acts over the widest range, {number(widths[widest])} {unit} with more than a hundredth of the case's "
