@@ -322,11 +322,15 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     assert "jobs to do: 1" in done("run", str(path), "--no-report", "--fresh")
 
 
-def test_two_blades_answer_and_can_be_read_without_this_package(tmp_path: Path) -> None:
+def test_two_blades_answer_and_can_be_read_without_this_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stickslip.cli, "MANY_CASES", 1)
     few = {"forced_response.points": "4", "forced_response.stability": '"off"', "reduction.fixed_interface_modes": "6"}
     path = write_two_blades(tmp_path, {"vary.load.shaker.ratio": "[2000, 1000]"} | few)
     said = done("run", str(path), "--workers", "2")
     assert "ratio 1000" in said
+    assert "writing the page of 2 cases" in said
     page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
     for key in ("response", "loops_t", "states", "motion_damper", "mesh"):
         assert f'<figure id="fig-{key}"' in page

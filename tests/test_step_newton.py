@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
@@ -21,8 +21,7 @@ def test_factors_with_row_pivoting_solve_the_system(k: int, extra: int, seed: in
     rng = np.random.default_rng(seed)
     matrix, right = rng.standard_normal((k, k)), rng.standard_normal(k)
     matrix[np.arange(k), np.arange(k)] *= rng.choice([0.0, 1e-3, 1.0], k)  # rows have to change places
-    if np.linalg.cond(matrix) > 1e8:
-        return
+    assume(np.linalg.cond(matrix) < 1e8)
     lu, pivot, x = np.zeros((k + extra, k + extra)), np.zeros(k + extra, dtype=np.int64), np.zeros(k + extra)
     lu[:k, :k], x[:k] = matrix.T, right
     solve(lu, pivot, x, k)

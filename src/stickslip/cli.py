@@ -25,9 +25,7 @@ from stickslip.api.screen import Screen, on_screen
 from stickslip.errors import InputError, StickslipError, input_error
 
 FILES_TOLD = 4  # files of an export that are listed
-MANY_CASES = (
-    12  # of a study, whose page takes more than some 20 s to write: measured with 33 cases, 62 s beside other programs
-)
+MANY_CASES = 12  # of a study, whose page takes 7 s of CPU; a page of 33 took 62 s by the clock (28 Nov 2026)
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(

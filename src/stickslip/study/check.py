@@ -23,7 +23,7 @@ SECTIONS = {
     "beside": "What stands beside the range",
 }  # field of `Advice` -> heading
 DOUBTFUL = "doubtful"
-START_S = 5.0  # of CPU: importing the libraries and loading compiled functions
+START_S = 5.0  # of CPU: imports and compiled functions; `check` of four masses takes 5.6 s in all (28 Nov 2026)
 NO_DOUBT = "nothing that can be seen without solving"
 
 

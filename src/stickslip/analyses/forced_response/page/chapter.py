@@ -82,7 +82,7 @@ def _answer(response: Response) -> Card:
         alike = f", and none is {percent(100 * _ALIKE)} larger" * (share > 1 - _ALIKE)
         label = f"with {best.label}, the smallest {kind} of {which}{counted(len(counted_in), 'case')}{alike}"
         told.append(f"{ratio}{percent(100 * float(share))} of the largest, {response.peak_is(best)}")
-        told += _smallest_worst(response, peaks, best)
+        told += _smallest_worst(response, peaks)
     idle = all(loss_at_peak(Curve(response.data, c.index)) == 0 for c in counted_in)
     if idle:
         told.append(f"Friction dissipates nothing at {'any' if len(counted_in) > 1 else 'the'} peak")
@@ -97,7 +97,7 @@ def _answer(response: Response) -> Card:
     return Card(value, label, ". ".join([*told, *_next(response, best, idle=idle)]) + ".")
 
 
-def _smallest_worst(response: Response, peaks: Mapping[ShownCase, float], best: ShownCase) -> list[str]:
+def _smallest_worst(response: Response, peaks: Mapping[ShownCase, float]) -> list[str]:
     """Return the value of the first varied number whose worst peak over all curves is smallest; nothing for a single curve.
 
     The other varied keys may be uncertain, such as a friction coefficient, or several loads, so that none of their values can be chosen.
@@ -117,8 +117,8 @@ def _smallest_worst(response: Response, peaks: Mapping[ShownCase, float], best: 
     named = " ".join(filter(None, (word, number(least.value), unit)))
     level = f", {response.level(least)}" if response.trust(least) else ""
     size = f"{amplitude(peaks[least], response.unit)}{level}"
-    over = percent(100 * (peaks[least] / peaks[best] - 1.0))
-    return [f"In the worst of {len(curves)} curves {named} is best: {size}, {over} above the smallest"]
+    over = percent(100 * (peaks[least] / min(peaks.values()) - 1.0))
+    return [f"In the worst of {len(curves)} curves {named} is best: {size}, {over} above the smallest peak"]
 
 
 def _size(response: Response, case: ShownCase) -> str:

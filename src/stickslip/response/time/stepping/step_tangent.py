@@ -213,7 +213,7 @@ def _step(
 
 
 def kept(monodromy: FloatArray, places: Sequence[int] | IntArray) -> IntArray:
-    """Return those of the states at `places` that stay constant over the period, independently of all others."""
+    """Return the states among `places` that stay constant over the period, independently of all others."""
     rows = monodromy[places].copy()
     rows[np.arange(len(places)), places] -= 1.0
     return np.asarray(np.asarray(places)[~np.any(rows, axis=1)])

@@ -207,8 +207,8 @@ def _widest_range(response: Response, total: FloatArray) -> str:
         at = response.points(case)
         lossy = x[at][np.nan_to_num(total[at]) > 0.01 * np.nanmax(np.append(total[at], 0.0))]
         widths.append(float(np.ptp(lossy)) if lossy.size else 0.0)
-    if not any(widths):
-        return _NO_POINT
+    if not any(widths):  # a single point in each case
+        return ""
     widest = int(np.argmax(widths))
     return (
         f"Friction acts over the widest range, {number(widths[widest])} {unit} with more than a hundredth of the case's "
