@@ -24,9 +24,7 @@ SHELL = ("analyses/",)
 SMALL_MODULE = 60  # lines of code
 # small modules that one other imports, and why they stand alone
 REASONS = {
-    "analyses.forced_response.records.pressures": "sentences of `check` on pressure fields: no part of the response",
     "analyses.forced_response.stability.elsewhere": "other motions beside the peak: one rule",
-    "analyses.nonlinear_mode.solve": "a role of every analysis",
     "api.reading": "read by the command line before anything that computes",
     "assembly.extent": "slip and strain against the size of the parts: one rule",
     "contact.steps.element": "one step a file, compiled when its law is first used",

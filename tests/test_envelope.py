@@ -8,7 +8,7 @@ import scipy.signal
 from test_run_up import LUMPED
 
 import stickslip as ss
-from stickslip.analyses.run_up.solve import neglected
+from stickslip.analyses.run_up.analysis import neglected
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evidence.validation.case_b12_mistuning import DEVIATIONS, MISTUNED, TUNED
-from stickslip.analyses.forced_response.records.bounds import localisation, whitehead
+from stickslip.analyses.forced_response.records.blades import localisation, whitehead
 from stickslip.api.study import Study
 from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError

@@ -5,7 +5,7 @@ import pytest
 from study_texts import DETACHED, JENKINS, answered, study_of
 
 import stickslip as ss
-from stickslip.analyses.modal_synthesis import solve as solving
+from stickslip.analyses.modal_synthesis import analysis as solving
 from stickslip.analyses.modal_synthesis.problem import _bounded
 from stickslip.analyses.page import plots
 from stickslip.errors import InputError
@@ -92,7 +92,7 @@ def test_an_interrupted_run_goes_on_with_the_mode_that_it_has(tmp_path, monkeypa
     monkeypatch.setattr(solving, "_level", stopped)
     with pytest.raises(BaseException, match="goes on from there"):
         run_study(study)
-    monkeypatch.setattr("stickslip.analyses.modal_synthesis.solve.nonlinear_mode", None)
+    monkeypatch.setattr("stickslip.analyses.modal_synthesis.analysis.nonlinear_mode", None)
     run_study(study)
     assert calls == [0.02, 0.5, 1.0, 1.0, 2.0]
 

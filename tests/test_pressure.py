@@ -12,7 +12,7 @@ from small_v2 import SECTOR
 from test_assembly_wheel import ORDER, SECTORS, H, sector_model, shrouded_sector
 
 import stickslip as ss
-from stickslip.analyses.forced_response.records.pressures import pressure_lines
+from stickslip.analyses.forced_response.advice import pressure_lines
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.fluid.pressure import PressureField, put_on
 from stickslip.assembly.locations import Places

@@ -13,9 +13,8 @@ from test_limit_cycle_study import SHROUDS, flow
 
 import stickslip as ss
 from stickslip.analyses.page import plots
-from stickslip.analyses.quasi_periodic import solve
-from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC
-from stickslip.analyses.quasi_periodic.solve import at_frequency
+from stickslip.analyses.quasi_periodic import analysis
+from stickslip.analyses.quasi_periodic.analysis import QUASI_PERIODIC, at_frequency
 from stickslip.errors import InputError
 from stickslip.response.quasi_periodic import tone
 from stickslip.response.self_excited.in_time import march_periods, wave_history
@@ -191,10 +190,10 @@ def test_an_accuracy_that_is_missed_is_doubtful() -> None:
 
 def test_a_tone_that_does_not_converge_is_told_with_where_it_was_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing = SimpleNamespace(motion=None, forced=SimpleNamespace(converged=True, indices=()), ratio=np.nan)
-    monkeypatch.setattr(solve, "tone_beside", lambda *_: nothing)
-    monkeypatch.setattr(solve, "swept", lambda *_: [])
+    monkeypatch.setattr(analysis, "tone_beside", lambda *_: nothing)
+    monkeypatch.setattr(analysis, "swept", lambda *_: [])
     question = SimpleNamespace(asked=SimpleNamespace(second_hz=21.5), waves=None, first=None)
     problem = SimpleNamespace(with_indices=lambda _: None)
-    _, motion, kind, why, _ = solve._of_tone(question, problem, 1.0, None)  # type: ignore[arg-type]
+    _, motion, kind, why, _ = analysis._of_tone(question, problem, 1.0, None)  # type: ignore[arg-type]
     assert (motion, kind) == (None, "second tone")
     assert re.fullmatch(r"no second tone converged near 21\.50* Hz", why)

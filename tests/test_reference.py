@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.analyses.waves.reference import read_reference
+from stickslip.analyses.waves.modes import read_reference
 from stickslip.errors import InputError
 
 HEAD = "case,nodal_diameter,mode,frequency_hz"

@@ -27,8 +27,7 @@ from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.inputs import Varied, as_run, inputs, told
 from stickslip.analyses.page import plots, report_file, report_html
-from stickslip.analyses.pictures.model import reduction
-from stickslip.analyses.pictures.skin import edges, skin_picture
+from stickslip.analyses.pictures import edges, reduction, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
 from stickslip.report.content import Table

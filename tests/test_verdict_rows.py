@@ -16,9 +16,9 @@ from stickslip.analyses.forced_response.verdicts.curve import jumps
 from stickslip.analyses.limit_cycle import verdicts as cycles
 from stickslip.analyses.limit_cycle.records import LimitCycles
 from stickslip.analyses.modal_synthesis import verdicts as synthesis
-from stickslip.analyses.modal_synthesis.percents import percent
+from stickslip.analyses.modal_synthesis.analysis import judged
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis
-from stickslip.analyses.modal_synthesis.solve import judged
+from stickslip.analyses.modal_synthesis.verdicts import percent
 from stickslip.analyses.nonlinear_mode import verdicts as backbones
 from stickslip.analyses.nonlinear_mode.records import NonlinearModes
 from stickslip.analyses.quasi_periodic import verdicts as two_frequencies

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evidence.models.two_blades import two_blades
-from stickslip.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
+from stickslip.analyses.modal_synthesis.analysis import DOUBTFUL, TRUSTED
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode

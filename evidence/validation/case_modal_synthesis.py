@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from evidence.validation.compare import Record, bound, record
-from stickslip.analyses.modal_synthesis.solve import DOUBTFUL, TRUSTED
+from stickslip.analyses.modal_synthesis.analysis import DOUBTFUL, TRUSTED
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError

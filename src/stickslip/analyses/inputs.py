@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.pictures.model import of_first_case
+from stickslip.analyses.pictures import of_first_case
 from stickslip.report.content import Table
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
 from stickslip.report.result import Node

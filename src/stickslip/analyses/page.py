@@ -8,10 +8,10 @@ from typing import Any
 import plotly.graph_objects as go
 import xarray as xr
 
+from stickslip.analyses import pictures
 from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
-from stickslip.analyses.pictures import model
 from stickslip.analyses.waves.page import waves
 from stickslip.analyses.waves.page.resonant import with_resonance
 from stickslip.errors import input_error
@@ -138,7 +138,7 @@ def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
         parts = [part for block in section.blocks for part in block.parts]
         for view in _views(section, data):
             found += _contents(parts, view)
-    found += _contents((nonlinear_mode.over_responses, model.picture), _nodes(tree))
+    found += _contents((nonlinear_mode.over_responses, pictures.picture), _nodes(tree))
     return {own.key: own.figure for own in found if isinstance(own, Plot)}
 
 
@@ -162,9 +162,9 @@ def report_html(tree: xr.DataTree) -> str:
     body = placing(_contents((nonlinear_mode.over_responses,), nodes))
     chapters += [Chapter("backbones", "Responses and modes", body)] if body else []
     chapters = sorted(chapters, key=lambda chapter: chapter.folded)
-    drawing = model.picture(nodes)
+    drawing = pictures.picture(nodes)
     given = placing([*([drawing] if drawing else []), *inputs(study_of(root), nodes)])
-    facts = placing(_contents(model.PARTS, nodes))
+    facts = placing(_contents(pictures.PARTS, nodes))
     for key, title, body in (("inputs", "What was computed", given), ("model", "Model", facts)):
         chapters += [Chapter(key, title, body, folded=True)] if body else []
     chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree)), folded=True))

@@ -7,7 +7,7 @@ from stickslip.analyses.all_motions.problem import Question, question_of
 from stickslip.analyses.all_motions.records import FOUND, FoundMotions, answer, found_motions
 from stickslip.analyses.all_motions.table import AllMotionsTable
 from stickslip.analyses.all_motions.verdicts import case_verdicts, tables
-from stickslip.analyses.collected import of_answers
+from stickslip.analyses.columns import of_answers
 from stickslip.assembly.model import Model
 from stickslip.response.all_motions.found import Stage, gathered
 from stickslip.response.all_motions.search import PERIODS_OF_A_START, search_seconds, search_stages

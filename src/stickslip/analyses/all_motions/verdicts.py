@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.all_motions.records import FoundMotions, SearchedFrequency
-from stickslip.analyses.collected import told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import record_of, told_apart
 from stickslip.response.all_motions.basins import ALIKE
 from stickslip.response.all_motions.found import SPENT
 from stickslip.response.all_motions.search import WHOLE

@@ -1,7 +1,7 @@
-"""Advice of ``stickslip check`` on a case: computation, cost, doubts, contacts at rest, natural frequencies."""
+"""Advice of ``stickslip check`` on a case: computation, cost, doubts, contacts at rest, natural frequencies, pressure fields."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -18,15 +18,20 @@ from stickslip.analyses.forced_response.physics.known import (
 from stickslip.analyses.forced_response.physics.limits import NAMED_MODES, Physics, beforehand, driven_line, physics_of
 from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
 from stickslip.analyses.forced_response.problem import Question, question_of
-from stickslip.analyses.forced_response.records.pressures import pressure_lines
 from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
 from stickslip.analyses.forced_response.stability.stable import cost_lines
-from stickslip.arrays import FloatArray
+from stickslip.analyses.waves.records import label
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.assembly.build import holding_points
+from stickslip.assembly.fluid.aero_forces import own_dofs, phases
+from stickslip.assembly.forces import Load, force_of
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.model.facts import facts_of_part
+from stickslip.model.modes import normal_modes
 from stickslip.model.slow_steps import step
+from stickslip.reduction.waves import excited_wave
 from stickslip.study.analysis import Advice, Case
 from stickslip.units import HZ, millimetres
 
@@ -35,6 +40,8 @@ APPROACH_M = 2e-4  # elastic approach of two bodies at rest: pressed metal surfa
 HEAVY = 0.3  # mass of a rigid body over the mass of all other parts: dampers weigh a few per cent of a blade
 FAR_OFF = 20.0  # frequencies off by this factor point to units
 _ENDS_OF_SENTENCES = re.compile(r"(?<=[^.0-9])\. (?=[A-Z0-9a-z])|; |: ")
+ROUNDING = 1e-12  # m
+MODES = 3  # modes with a reported modal force, unless the study sets their number
 
 
 def advice(case: Case, model: Model) -> Advice:
@@ -221,3 +228,50 @@ def sentences(text: str) -> Sequence[str]:
     head, _, rest = text.partition(": ")
     first, *others = _ENDS_OF_SENTENCES.split(rest.removesuffix("."))
     return [f"{head}: {first}", *(f"  {other}" for other in others)]
+
+
+def pressure_lines(model: Model, modes: Mapping[str, int]) -> tuple[str, ...]:
+    """Return sentences about the pressure fields of a model, with the modal forces of `modes` modes for each load."""
+    found: list[str] = []
+    for name, load in model.loads.items():
+        if load.field is not None:
+            found += _about(model, name, load, modes.get(name, MODES))
+    return tuple(found)
+
+
+def _about(model: Model, name: str, load: Load, count: int) -> list[str]:
+    assert load.field is not None
+    put = load.field.on(model.places, load.on, f"load.{name}.on")
+    (force, moment), (own_force, own_moment) = put.before, put.after
+    offset = f"; points up to {millimetres(put.offset if put.offset > ROUNDING else 0.0, 3)} off it"
+    if put.inward:
+        offset += ", their normals point into the body"
+    if np.any(put.clamped):
+        offset += f"; {_vector(put.clamped)} N act on clamped nodes"
+    sums = (
+        f"load.{name}: pressure on {load.on}: force {_vector(force)} N, on its nodes {_vector(own_force)} N; moment about the origin "
+        f"{_vector(moment)} N m, on its nodes {_vector(own_moment)} N m{offset}"
+    )
+    if not load.harmonic or not count:
+        return [sums]
+    number = excited_wave((load.engine_order or 0) * load.harmonic, model.sectors)
+    moving = model.at(model.speed, number, holding_points(model, "static"))
+    shapes = normal_modes(moving, count)
+    turned = np.asarray(moving.expand(shapes.shapes))
+    turned = turned * phases(turned, own_dofs(model))
+    modal = turned.conj().T @ force_of(model.places, name, load)
+    wave = label(number, model.sectors, parted=True)
+    told = ", ".join(
+        f"{hz:.6g} Hz: {abs(q):.4g} at {np.degrees(np.angle(q)):.1f} deg"
+        for hz, q in zip(shapes.frequencies_hz, modal, strict=True)
+    )
+    return [sums, f"load.{name}: modal forces in N/sqrt(kg) on {wave}, contacts static: {told}"]
+
+
+def _vector(values: ComplexArray) -> str:
+    """Write three complex numbers as amplitude and phase, real ones as they are."""
+    if not np.any(values.imag):
+        return f"({', '.join(f'{v:.5g}' for v in values.real)})"
+    size = np.abs(values).max()
+    told = [f"{abs(v):.5g} at {np.degrees(np.angle(v)) if abs(v) > 1e-9 * size else 0:.1f} deg" for v in values]
+    return f"({', '.join(told)})"

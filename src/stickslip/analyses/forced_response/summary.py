@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.forced_response.records.bounds import BOUND
+from stickslip.analyses.forced_response.records.blades import BOUND
 from stickslip.analyses.forced_response.records.columns import (
     BifurcationRows,
     BifurcationSearch,

@@ -1,19 +1,193 @@
 """Limit cycles: unstable waves bounded by friction, and the stability of the resulting motion."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from stickslip.analyses.collected import of_answers
+from stickslip.analyses.columns import of_answers
 from stickslip.analyses.forced_response.stability.examination import too_long
-from stickslip.analyses.limit_cycle.problem import IN_TIME, question_of
-from stickslip.analyses.limit_cycle.records import CycleBranch, LimitCycles, answer
-from stickslip.analyses.limit_cycle.solve import solve
+from stickslip.analyses.limit_cycle.problem import IN_TIME, Question, question_of
+from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles, answer
 from stickslip.analyses.limit_cycle.table import LimitCycleTable
+from stickslip.analyses.limit_cycle.time import compete, settle_cycles
 from stickslip.analyses.limit_cycle.verdicts import case_verdicts, tables
+from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates
 from stickslip.assembly.model import Model
+from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
-from stickslip.study.analysis import Analysis, Case, of_tables
+from stickslip.response.self_excited.curve import AmplitudePoint, damping_over_amplitude, slip_amplitude
+from stickslip.response.self_excited.cycles import (
+    CycleStability,
+    LimitCycle,
+    crossings,
+    cycle_stability,
+    limit_cycles,
+    with_extremes,
+)
+from stickslip.response.self_excited.modes import StuckMode
+from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
+from stickslip.study.analysis import Analysis, Case, Notes, of_tables
+from stickslip.study.store.progress import LOG, advance
+from stickslip.units import HZ, millimetres
+
+NOT_EXAMINED = "not examined"
+BEGINS = 0.5  # first amplitude of the curve over the amplitude at which slip begins
+ENDS = 300.0  # last amplitude, in the same way
+MODEL, LINEAR, COORDINATES = "model", "linear", "coordinates"  # names of notes
+
+
+def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iterator[CycleBranch]:
+    """Yield the branches of unfinished modes."""
+    modes = {wave: question.modes(wave) for wave in question.waves}
+    notes.put(MODEL, dict(question.facts) | {"output": question.model.output_labels[0]})
+    notes.put(LINEAR, _linear(modes))
+    notes.put(COORDINATES, known_coordinates(question.model))
+    tasks = [(w, m) for w, own in modes.items() for m in question.followed(own)]
+    found = list(done)
+    for i, (wave, mode) in enumerate(tasks):
+        if i < len(done):
+            continue
+        branch = follow_mode(question, wave, mode)
+        name = _named(question, wave, mode)
+        LOG.info(f"{name}: {_told(branch)}")
+        advance((i + 1) / len(tasks), name)
+        found.append(branch)
+        yield branch
+    if question.in_time:
+        for i, branch in enumerate(found):
+            name = f"in_time.{i}"
+            if notes.get(name) is None:
+                notes.put(name, settle_cycles(question, branch))
+        if notes.get("competition") is None:
+            notes.put("competition", compete(question, found))
+
+
+def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
+    """Return the branch of a mode."""
+    system = as_wave(question.model.system, wave)
+    try:
+        problem = self_excited_motions(system, question.model.load, mode, coordinate(system), question.discretisation)
+        slips = slip_amplitude(problem)
+    except StickslipError as error:
+        return _without(wave, mode, str(error))
+    given = question.asked.amplitude_mm
+    span = (BEGINS * slips, ENDS * slips)
+    if given is not None:
+        span = (1e-3 * given[0], 1e-3 * given[1])
+    points = damping_over_amplitude(problem, span, question.asked.points)
+    solutions = with_extremes(problem, points)
+    cycles = limit_cycles(
+        problem,
+        solutions,
+        most_harmonics=question.asked.most_harmonics,
+        tolerance=0.01 * question.asked.accuracy_percent,
+    )
+    every = sorted([p for p in points if not p.converged], key=lambda p: p.amplitude)
+    branch = _branch(wave, problem, slips, [*solutions, *every], cycles)
+    return replace(branch, lost_cycles=max(len(crossings(solutions)) - len(cycles), 0))
+
+
+def _branch(
+    wave: int, problem: SelfExcited, slips: float, points: Sequence[AmplitudePoint], cycles: Sequence[LimitCycle]
+) -> CycleBranch:
+    known = [p for p in points if p.converged]
+    top = max(known, key=lambda p: p.level, default=None)
+    return CycleBranch(
+        wave_number=wave,
+        mode=problem.mode.number,
+        omega=problem.mode.omega,
+        ratio=problem.mode.ratio,
+        slip_amplitude=slips,
+        largest_damping_ratio=np.nan if top is None else top.level,
+        largest_damping_amplitude=np.nan if top is None else top.amplitude,
+        amplitude=np.array([p.amplitude for p in points]),
+        motion_omega=np.array([p.omega if p.converged else np.nan for p in points]),
+        damping_ratio=np.array([p.level if p.converged else np.nan for p in points]),
+        cycles=tuple(_cycle(problem, cycle) for cycle in cycles),
+    )
+
+
+def _cycle(problem: SelfExcited, cycle: LimitCycle) -> Cycle:
+    """Return the record of a limit cycle, its stability examined."""
+    own = problem.with_order(cycle.order)
+    examined = _examined(own, cycle)
+    known = examined if isinstance(examined, CycleStability) else None
+    full = own.balance.linear.recover(cycle.omega, cycle.coefficients)
+    stability = None if known is None else known.stability
+    grows = None if known is None else known.wave
+    return Cycle(
+        amplitude=cycle.amplitude,
+        omega=cycle.omega,
+        slope=cycle.slope,
+        harmonics=cycle.order,
+        change=cycle.change,
+        enough=cycle.enough,
+        stability=NOT_EXAMINED if stability is None else stability.verdict,
+        reason=str(examined) if stability is None else stability.reason,
+        multiplier=_number(None if stability is None else stability.multiplier),
+        multiplier_error=_number(None if stability is None else stability.multiplier_error),
+        along=np.nan if known is None else abs(known.along - 1.0),
+        growing_wave=NO_WAVE if grows is None else grows.wave,
+        growing_omega=np.nan if grows is None else grows.omega,
+        coefficients=np.stack([full.real, full.imag], axis=-1),
+    )
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
+    """Return the stability of a cycle, or the reason why it is not examined."""
+    why = too_long(problem.system, forced=False)
+    if why:
+        return why
+    try:
+        return cycle_stability(problem, cycle)
+    except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
+        return str(error)
+
+
+def _without(wave: int, mode: StuckMode, problem: str) -> CycleBranch:
+    none = np.zeros(0)
+    return CycleBranch(
+        wave_number=wave,
+        mode=mode.number,
+        omega=mode.omega,
+        ratio=mode.ratio,
+        slip_amplitude=np.nan,
+        largest_damping_ratio=np.nan,
+        largest_damping_amplitude=np.nan,
+        problem=problem,
+        amplitude=none,
+        motion_omega=none,
+        damping_ratio=none,
+    )
+
+
+def _linear(modes: dict[int, list[StuckMode]]) -> dict[str, object]:
+    """Return frequencies (Hz) and damping ratios of all examined modes; NaN if a wave has fewer."""
+    most = max(len(own) for own in modes.values())
+    hertz, ratio = np.full((2, len(modes), most), np.nan)
+    for i, own in enumerate(modes.values()):
+        hertz[i, : len(own)] = [m.omega / HZ for m in own]
+        ratio[i, : len(own)] = [m.ratio for m in own]
+    return {"wave": np.array(list(modes), dtype=np.int64), "hertz": hertz, "ratio": ratio}
+
+
+def _named(question: Question, wave: int, mode: StuckMode) -> str:
+    of = "" if wave == NO_WAVE else f"wave {wave}, "
+    label = f"{question.label}: " if question.label else ""
+    return f"{label}{of}mode {mode.number} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
+
+
+def _told(branch: CycleBranch) -> str:
+    if branch.problem:
+        return branch.problem
+    each = [f"{millimetres(c.amplitude, 5)} at {c.omega / HZ:.4f} Hz ({c.stability})" for c in branch.cycles]
+    return f"limit cycles: {', '.join(each) or 'none'}"
 
 
 def _lost(found: LimitCycles) -> int:

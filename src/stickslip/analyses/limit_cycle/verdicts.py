@@ -3,8 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import number, record_of, told_apart
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.response.self_excited.in_time import UNSETTLED
 from stickslip.study.analysis import TextTable

@@ -7,8 +7,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.columns import record_of
-from stickslip.analyses.modal_synthesis.percents import percent
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
+from stickslip.analyses.modal_synthesis.verdicts import percent
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.columns import record_of
-from stickslip.analyses.modal_synthesis.percents import percent
+from stickslip.analyses.columns import number, record_of, told_apart
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.response.nonlinear_modes.single_mode_validity import ALONE
 from stickslip.study.analysis import TextTable
@@ -27,6 +25,28 @@ FAST = 0.05  # relative change of the amplitude in a radian, above which a passa
 WRONG = 0.02  # largest relative error of the peak against the direct solution
 ALONG = 0.05  # the same of the curve where the mode answers alone
 FEW = 4  # largest number of levels that are named one by one
+
+
+def percent(share: float, *, unit: bool = True) -> str:
+    """Write a fraction in percent with at most three digits; above 1000 % as a bound."""
+    value = 100 * share
+    if not np.isfinite(value):
+        return "-"
+    if abs(value) > 1000.0:
+        text = "over 1000" if value > 0 else "below -1000"
+    elif abs(value) >= 9.95:
+        text = f"{value:.0f}"
+    else:
+        text = _short(value)
+    return f"{text} %" if unit else text
+
+
+def _short(value: float) -> str:
+    """Write a number below ten with two digits; below 0.001 as a bound."""
+    if abs(value) < 1e-3:
+        return "0" if value == 0.0 else "< 0.001"
+    digits = max(0, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".")
 
 
 def case_verdicts(label: str, case: ModalSynthesis) -> list[Verdict]:

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import number, record_of, told_apart
 from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
 from stickslip.response.nonlinear_modes.backbone import MEETS, OVER
 from stickslip.study.analysis import TextTable

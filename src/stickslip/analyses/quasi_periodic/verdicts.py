@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import number, record_of, told_apart
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict

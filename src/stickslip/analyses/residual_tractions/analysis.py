@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.analyses.collected import of_answers
+from stickslip.analyses.columns import of_answers
 from stickslip.analyses.residual_tractions.problem import MOTIONS, Question, cost_of, question_of
 from stickslip.analyses.residual_tractions.records import ResidualTractions, TractionRecord, answer, to_record
 from stickslip.analyses.residual_tractions.table import ResidualTractionsTable

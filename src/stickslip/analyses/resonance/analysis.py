@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import of_answers
+from stickslip.analyses.columns import of_answers
 from stickslip.analyses.resonance.envelope import heights, valley
 from stickslip.analyses.resonance.problem import Question, more_than, question_of
 from stickslip.analyses.resonance.records import Resonances, answer

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import number, told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import number, record_of, told_apart
 from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.study.analysis import TextTable
 from stickslip.study.verdict import Verdict, from_json

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.analyses.collected import told_apart
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import record_of, told_apart
 from stickslip.analyses.waves.records import (
     Campbell,
     Flutter,

@@ -6,7 +6,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.records.bounds import BOUND
+from stickslip.analyses.forced_response.records.blades import BOUND
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import GRID, INK, MUTED, Plot, colour, legend_above, log_ticks, styled

@@ -1,18 +1,33 @@
-"""A mistuned response beside the tuned one: amplification, largest blade, waves, localisation."""
+"""A mistuned response beside the tuned one: amplification and its bound, largest blade, waves, localisation."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
-from stickslip.analyses.forced_response.records.bounds import BOUND, localisation, whitehead
 from stickslip.analyses.forced_response.records.columns import Blades, stored
 from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.records.values import Values
-from stickslip.arrays import ComplexArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
+
+BOUND = "Whitehead's (1 + √n)/2, a bound for one family of modes, equal damping of all waves and no friction only,"
+
+
+def whitehead(blades: int) -> float:
+    """Return Whitehead's (1 + √n)/2: largest amplification of one family of modes with equal damping in all waves, without friction."""
+    return 0.5 * (1.0 + float(np.sqrt(blades)))
+
+
+def localisation(amplitudes: FloatArray) -> float:
+    """Return the localisation factor of amplitudes (n,): 0 if all are equal, 1 if a single blade moves."""
+    largest = float(np.max(amplitudes))
+    others = np.delete(amplitudes, int(np.argmax(amplitudes)))
+    if not largest or not others.size:
+        return 0.0
+    return float(1.0 - np.sqrt(np.mean(others**2)) / largest)
 
 
 def tuned_response(question: Question) -> Response:

@@ -14,7 +14,7 @@ from stickslip.analyses.forced_response.page.at_peak.bodies import group_colours
 from stickslip.analyses.forced_response.page.at_peak.contacts import states
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Drawn, read
-from stickslip.analyses.pictures.skin import BODY, EDGES, STEEL, edges, segments, space, surface
+from stickslip.analyses.pictures import BODY, EDGES, STEEL, edges, segments, space, surface
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, INK, MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, styled

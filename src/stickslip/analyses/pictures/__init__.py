@@ -1,1 +1,0 @@
-"""Pictures of the model: its skin, contact patches and mode shapes."""
