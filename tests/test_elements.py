@@ -180,9 +180,11 @@ def test_neighbours_that_do_not_share_a_mid_side_node_are_refused():
 def test_meshes_that_cannot_be_are_refused():
     mesh = box(8, SIZE, (1, 1, 1))
     for cells, message in [
-        (mesh.cells[:, :6], r"rows of 4, 10, 8 or 20 nodes, got an array of shape \(1, 6\)"),
+        (mesh.cells[:, :7], r"rows of 4, 5, 6, 8, 10, 13, 15 or 20 nodes, got \[7\]"),
+        (mesh.cells[0], r"got an array of shape \(8,\)"),
         (mesh.cells + 1, "from 1 to 8, but there are 8 points"),
-        (mesh.cells - 1, "from -1 to 6"),
+        (mesh.cells - 1, r"nodes, got \[7\].*-1 fills the ends of shorter rows"),
+        (np.roll(np.pad(mesh.cells[:, :6], ((0, 0), (0, 2)), constant_values=-1), 1, axis=1), "from -1 to"),
     ]:
         with pytest.raises(InputError, match=message):
             SolidMesh(mesh.points, cells, {})

@@ -9,7 +9,7 @@ import scipy
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.rotation import RotatingSolid
+from stickslip.model.fe.rotation import RotatingSolid, with_inner_inertia
 from stickslip.model.mesh.solid_mesh import SolidMesh, mirrored_cells
 from stickslip.model.part import BodyPoints, Part, Place, rigid_part
 from stickslip.model.structure import Dofs, Structure
@@ -145,7 +145,12 @@ def _moved_points(points: BodyPoints, place: Place) -> BodyPoints:
 
 def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> RotatingSolid:
     mesh = moved_mesh(solid.mesh, place)
-    load: FloatArray = solid.nodal_mass @ solid.axis.arm(mesh.points)
+    arm = solid.axis.arm(mesh.points)
+    load: FloatArray = solid.nodal_mass @ arm
+    inner = with_inner_inertia(
+        scipy.sparse.csr_array((arm.size, arm.size)), mesh, solid.material, solid.quadrature, np.eye(3)
+    )
+    load = load.ravel() + inner @ arm.ravel() if inner.nnz else load.ravel()
     return RotatingSolid(
         structure,
         mesh,
@@ -154,5 +159,5 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
         solid.quadrature,
         solid.moving,
         solid.nodal_mass,
-        np.asarray(load).ravel()[solid.moving],
+        load[solid.moving],
     )

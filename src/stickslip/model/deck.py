@@ -13,9 +13,9 @@ from stickslip.arrays import IntArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh, by_kind
 
-ELEMENT_TYPES = {4: "C3D4", 8: "C3D8", 10: "C3D10", 20: "C3D20"}
+ELEMENT_TYPES = {4: "C3D4", 6: "C3D6", 8: "C3D8", 10: "C3D10", 15: "C3D15", 20: "C3D20"}
 ON_A_LINE = 10  # numbers on a line; CalculiX accepts at most 16
 
 
@@ -84,9 +84,13 @@ def write_deck(
     Raises
     ------
     InputError
-        If a set is missing, or nodal diameters are requested for a structure that is not cyclic.
+        If a set is missing, the mesh has pyramids, or nodal diameters are requested for a structure that is not cyclic.
     """
     axis, run = axis or Axis(), run or CalculixRun()
+    if not {width for width, _ in by_kind(mesh.cells)} <= ELEMENT_TYPES.keys():
+        raise input_error(
+            "write_deck", "the mesh has pyramids, which CalculiX does not have", "Divide them into tetrahedra."
+        )
     wanted = [*clamped, *(("cyclic_low", "cyclic_high") if sectors else ())]
     missing = [name for name in wanted if name not in mesh.node_sets]
     if missing:
@@ -124,10 +128,11 @@ def _mesh_cards(mesh: SolidMesh) -> Iterator[str]:
     # CalculiX reads 20 characters of a number, which leaves room for at most thirteen decimals
     for number, (x, y, z) in zip(numbers, mesh.points, strict=True):
         yield f"{number}, {x:.13e}, {y:.13e}, {z:.13e}"
-    yield f"*ELEMENT, TYPE={ELEMENT_TYPES[mesh.cells.shape[1]]}, ELSET=EALL"
     first = max(0, 1 - int(mesh.cell_numbers.min()))
-    for number, cell in zip(mesh.cell_numbers + first, numbers[mesh.cells], strict=True):
-        yield from _rows(np.concatenate([[number], cell]))
+    for width, rows in by_kind(mesh.cells):
+        yield f"*ELEMENT, TYPE={ELEMENT_TYPES[width]}, ELSET=EALL"
+        for number, cell in zip(mesh.cell_numbers[rows] + first, numbers[mesh.cells[rows, :width]], strict=True):
+            yield from _rows(np.concatenate([[number], cell]))
     for name, nodes in mesh.node_sets.items():
         yield f"*NSET, NSET={name.upper()}"
         yield from _rows(numbers[nodes])

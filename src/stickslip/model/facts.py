@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.model.fe.elements import chunks, gradients, shape_functions
-from stickslip.model.fe.solid import Material, Materials
+from stickslip.model.fe.elements import Quadrature, cell_groups, chunks, gradients
+from stickslip.model.fe.solid import Material, Materials, densities
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
@@ -133,16 +133,16 @@ _MEASURES: tuple[tuple[str, str, Callable[[Part], float]], ...] = (
 
 def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
     """Return the facts of a mesh with `dofs` free dofs; clamped nodes count."""
-    shape = shape_functions(mesh.cells.shape[1], DEGREE)
-    each = [material] * len(mesh.cells) if isinstance(material, Material) else material
-    density = np.array([one.density for one in each])
+    density = densities(mesh, material)
     mass, moment = 0.0, np.zeros(3)
-    for piece in chunks(mesh, shape):
-        _, weights = gradients(mesh, shape, piece)
-        places = np.einsum("qk,mkx->mqx", shape.values, mesh.points[mesh.cells[piece]])
-        weights = weights * density[piece][:, None]
-        mass += float(weights.sum())
-        moment += np.einsum("mq,mqx->x", weights, places)
+    for group in cell_groups(mesh, Quadrature(DEGREE, DEGREE)):
+        shape, own = group.strain, group.mesh
+        for piece in chunks(own, shape):
+            _, weights = gradients(own, shape, piece)
+            places = np.einsum("qk,mkx->mqx", shape.values, own.points[own.cells[piece]])
+            weights = weights * density[group.rows[piece]][:, None]
+            mass += float(weights.sum())
+            moment += np.einsum("mq,mqx->x", weights, places)
     return Facts(
         mass=mass,
         centre=_triple(moment / mass),

@@ -10,7 +10,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
-from stickslip.model.fe.elements import EXACT, Quadrature
+from stickslip.model.fe.elements import EXACT, Rules
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.fe.solid import Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -232,7 +232,7 @@ def solid_part(
     *,
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
-    quadrature: Quadrature = EXACT,
+    quadrature: Rules = EXACT,
     **others: Any,
 ) -> Part:
     """Return a part of finite elements.

@@ -1,18 +1,20 @@
 """Isoparametric cells: shape functions, quadrature, Jacobians, and assembly of their node blocks.
 
-Shape functions and quadrature rules come from scikit-fem, which is imported at first use.
+Shape functions and quadrature rules of tetrahedra and hexahedra come from scikit-fem, which is imported at first use; those of
+wedges and pyramids are in `fe.wedges`.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, missing_package
-from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
+from stickslip.model.fe.wedges import OWN_SHAPES, own_rule, own_shape_functions
+from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh, by_kind
 
 CHUNK = 200_000  # cells x quadrature points x nodes in one chunk: 20 to 100 MB
 TET_PLACES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
@@ -21,12 +23,18 @@ HEX_PLACES = np.array(
 )
 
 
+InnerModes = Literal["", "mean", "centre"]
+# each entry of ``1 − ξ²``, ``1 − η²``, ``1 − ζ²``: the incompatible modes of a brick of 8 nodes
+N_INNER = 3
+
+
 @dataclass(frozen=True)
 class Quadrature:
-    """Polynomial degrees that the quadrature rules integrate exactly on a straight-edged cell.
+    """Integration of the matrices of a cell: quadrature rules, and what some bricks of 8 nodes have beside them.
 
-    Degrees on tetrahedra: 2 has 4 points, 4 has 11. On hexahedra degree d has a Gauss rule of ⌈(d + 1) / 2⌉ points a
-    direction: 3 is the 2 x 2 x 2 rule, 4 and 5 the 3 x 3 x 3 rule.
+    A rule is told by the polynomial degree that it integrates exactly on a straight-edged cell. Degrees on tetrahedra: 2 has 4
+    points, 4 has 11. On hexahedra degree d has a Gauss rule of ⌈(d + 1) / 2⌉ points a direction: 3 is the 2 x 2 x 2 rule, 4 and 5
+    the 3 x 3 x 3 rule. On wedges the degree counts in the triangle and along the axis: 2 has 3 points in the triangle.
 
     Parameters
     ----------
@@ -34,14 +42,25 @@ class Quadrature:
         Degree for the stiffness and all other terms of strain energy.
     mass
         Degree for the mass and all other terms of inertia.
+    axial
+        Degree along the axis of a wedge; 0: as in its triangle.
+    inner
+        Incompatible modes of a brick of 8 nodes, condensed cell by cell, with their mass. ``"mean"``: their mean strain vanishes, so
+        that distorted bricks pass the patch test (Taylor, Beresford and Wilson 1976); ``"centre"``: as CalculiX's C3D8I, with the
+        Jacobian at the centre alone, which is the same for parallelepipeds; ``""``: none.
+    hourglass
+        Factor of the hourglass stiffness of a brick of 8 nodes with one integration point; None: a brick without.
     """
 
     stiffness: int = 4
     mass: int = 4
+    axial: int = 0
+    inner: InnerModes = ""
+    hourglass: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "mass"):
-            if not 1 <= getattr(self, name) <= 12:
+        for name in ("stiffness", "mass", "axial"):
+            if not (0 if name == "axial" else 1) <= getattr(self, name) <= 12:
                 raise input_error(
                     f"Quadrature.{name}",
                     f"must be a degree from 1 to 12, got {getattr(self, name)}",
@@ -58,6 +77,7 @@ class Quadrature:
 
 
 EXACT = Quadrature()
+Rules = Quadrature | Sequence[Quadrature]  # one for all cells, or one for each
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +92,113 @@ class Shape:
         (q, k, 3) derivatives with respect to the reference coordinates.
     weights
         (q,) weights, whose sum is the volume of the reference cell.
+    inner
+        Incompatible modes, as in `Quadrature`; they stand behind the k nodes in `values` and `slopes`.
+    mean
+        Whether slopes in space are averaged over the cell: one integration point.
     """
 
     values: FloatArray
     slopes: FloatArray
     weights: FloatArray
+    inner: InnerModes = ""
+    mean: bool = False
+
+    @property
+    def width(self) -> int:
+        """Number of nodes of the cell."""
+        return int(self.slopes.shape[1]) - (N_INNER if self.inner else 0)
+
+
+@dataclass(frozen=True, eq=False)
+class CellGroup:
+    """The cells of a mesh of one kind that have the same quadrature.
+
+    Parameters
+    ----------
+    mesh
+        These cells with all points of the whole mesh.
+    rows
+        Their places among the cells of the whole mesh.
+    rule
+        Their quadrature.
+    """
+
+    mesh: SolidMesh
+    rows: IntArray
+    rule: Quadrature
+
+    @property
+    def strain(self) -> Shape:
+        """Shape functions at the points of the rule for the stiffness."""
+        return self._shape(self.rule.stiffness)
+
+    @property
+    def inertia(self) -> Shape:
+        """Shape functions at the points of the rule for the mass."""
+        found = self._shape(self.rule.mass)
+        return replace(found, mean=False) if self.rule.mass > 1 else found
+
+    def _shape(self, degree: int) -> Shape:
+        plain = shape_functions(self.mesh.cells.shape[1], degree, self.rule.axial)
+        if self.rule.inner:
+            return _with_inner_modes(plain, degree, self.rule.inner)
+        if self.rule.hourglass is None or degree > 1:
+            return plain
+        eight = shape_functions(8, 3)
+        return Shape(brick_centre().values, eight.slopes, eight.weights, mean=True)
+
+
+def cell_groups(mesh: SolidMesh, rules: Rules) -> list[CellGroup]:
+    """Return the groups of cells of a mesh; one group is the mesh itself.
+
+    Raises
+    ------
+    InputError
+        If there is not one rule for each cell, or a rule for bricks of 8 nodes is given to other cells.
+    """
+    each = [rules] if isinstance(rules, Quadrature) else list(dict.fromkeys(rules))
+    which = np.zeros(len(mesh.cells), dtype=np.int64)
+    if not isinstance(rules, Quadrature):
+        if len(rules) != len(mesh.cells):
+            raise input_error(
+                "quadrature",
+                f"is a list of {len(rules)} for {len(mesh.cells)} cells",
+                "Give one, or one for each cell.",
+            )
+        place = {rule: i for i, rule in enumerate(each)}
+        which = np.array([place[rule] for rule in rules], dtype=np.int64)
+    found = []
+    for width, rows in by_kind(mesh.cells):
+        for i in np.unique(which[rows]):
+            own = rows[which[rows] == i]
+            if width != 8 and (each[i].inner or each[i].hourglass is not None):
+                raise input_error(
+                    "quadrature",
+                    f"gives incompatible modes or hourglass control to cells of {width} nodes",
+                    "Bricks of 8 nodes alone have them: give each cell its own Quadrature.",
+                )
+            whole = len(own) == len(mesh.cells)
+            part = (
+                mesh
+                if whole
+                else SolidMesh(mesh.points, mesh.cells[own, :width], {}, mesh.numbers, mesh.cell_numbers[own])
+            )
+            found.append(CellGroup(part, own, each[i]))
+    return found
+
+
+def _with_inner_modes(plain: Shape, degree: int, inner: InnerModes) -> Shape:
+    """Add ``1 − ξ²``, ``1 − η²`` and ``1 − ζ²`` on the cube from −1 to 1 to the shape functions of a brick."""
+    places, _ = library().quadrature.get_quadrature(library_element(8)[0], degree)
+    cube = 2 * places.T - 1  # scikit-fem's reference cube is [0, 1]³
+    slopes = -4 * cube[:, :, None] * np.eye(3)
+    values = np.hstack([plain.values, 1 - cube**2])
+    return Shape(values, np.concatenate([plain.slopes, slopes], axis=1), plain.weights, inner)
 
 
 def reference_places(width: int) -> FloatArray:
-    """Return the (k, 3) reference coordinates of the nodes of a cell with `width` nodes in VTK order."""
+    """Return the (k, 3) reference coordinates of the nodes of a tetrahedron or hexahedron with `width` nodes in VTK order."""
     places, edges = (TET_PLACES, TET_EDGES) if width in (4, 10) else (HEX_PLACES, HEX_EDGES)
     if width == len(places):
         return places
@@ -104,10 +222,25 @@ def library_element(width: int) -> tuple[Any, IntArray]:
     return element, np.asarray(distance.argmin(axis=1), dtype=np.int64)
 
 
-def shape_functions(width: int, degree: int) -> Shape:
-    """Return the shape functions of cells with `width` nodes (VTK order) at the points of the rule of `degree`."""
+def shape_functions(width: int, degree: int, axial: int = 0) -> Shape:
+    """Return the shape functions of cells with `width` nodes (VTK order) at the points of the rule of `degree`.
+
+    `axial` is the degree along the axis of a wedge; 0: `degree`.
+    """
+    if width in OWN_SHAPES:
+        points, own = own_rule(width, degree, axial or degree)
+        return Shape(*own_shape_functions(width, points), own)
+    places, weights = library().quadrature.get_quadrature(library_element(width)[0], degree)
+    return _at(width, places, weights)
+
+
+def brick_centre() -> Shape:
+    """Return the shape functions of a brick of 8 nodes at its centre; scikit-fem has no rule of one point on bricks."""
+    return _at(8, np.full((3, 1), 0.5), np.ones(1))
+
+
+def _at(width: int, places: FloatArray, weights: FloatArray) -> Shape:
     element, order = library_element(width)
-    places, weights = library().quadrature.get_quadrature(element, degree)
     values = np.empty((len(weights), width))
     slopes = np.empty((len(weights), width, 3))
     for theirs, ours in enumerate(order):
@@ -118,7 +251,7 @@ def shape_functions(width: int, degree: int) -> Shape:
 
 def chunks(mesh: SolidMesh, shape: Shape) -> Iterator[slice]:
     """Yield slices of the cells, each of at most `CHUNK` values."""
-    step = max(1, CHUNK // shape.values.size)
+    step = max(1, CHUNK * 3 // shape.slopes.size)
     for start in range(0, len(mesh.cells), step):
         yield slice(start, min(start + step, len(mesh.cells)))
 
@@ -127,13 +260,24 @@ def gradients(mesh: SolidMesh, shape: Shape, piece: slice) -> tuple[FloatArray, 
     """Return gradients (m, q, k, 3) of the shape functions in space, and weights (m, q) in m³."""
     jacobian = _jacobians(mesh, shape, piece)
     slopes = np.matmul(shape.slopes, np.linalg.inv(jacobian))
-    return slopes, np.linalg.det(jacobian) * shape.weights
+    scale = np.linalg.det(jacobian)
+    volume = scale * shape.weights
+    if shape.inner:
+        centre = mesh.points[mesh.cells[piece]].transpose(0, 2, 1) @ brick_centre().slopes[0]
+        inner = np.matmul(shape.slopes[:, shape.width :], np.linalg.inv(centre)[:, None])
+        if shape.inner == "mean":
+            inner = inner * (np.linalg.det(centre)[:, None] / scale)[..., None, None]
+        slopes[:, :, shape.width :] = inner
+    if shape.mean:
+        whole = volume.sum(axis=1, keepdims=True)
+        return np.einsum("mqka,mq->mka", slopes, volume / whole)[:, None], whole
+    return slopes, volume
 
 
 def _jacobians(mesh: SolidMesh, shape: Shape, piece: slice) -> FloatArray:
     """Return (m, q, 3, 3) derivatives of positions (third axis) with respect to reference coordinates (last axis)."""
     corners = mesh.points[mesh.cells[piece]]
-    return np.asarray(np.einsum("qkr,mkx->mqxr", shape.slopes, corners, optimize=True))
+    return np.asarray(np.einsum("qkr,mkx->mqxr", shape.slopes[:, : shape.width], corners, optimize=True))
 
 
 def check_jacobians(mesh: SolidMesh, shape: Shape) -> None:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.model.fe.elements import NodeBlocks, Shape, chunks, gradients, shape_functions
+from stickslip.model.fe.cell_matrices import cell_stiffness, condensed, inner_motion, store_blocks, with_inner_modes
+from stickslip.model.fe.elements import EXACT, NodeBlocks, Shape, cell_groups, chunks, gradients, shape_functions
 from stickslip.model.fe.solid import Materials, lame_constants
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
@@ -55,10 +56,11 @@ def prestress_terms(
         True: stress of the Green strain; False: stress of the small strain, linear in the displacement.
     """
     lame = lame_constants(mesh, material)
-    stores = [places.zeros(9), places.zeros(9), places.zeros(1)]
+    stores = [places.zeros(9), places.zeros(9), places.zeros(9 if shape.inner else 1)]
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
-        turn = displacement_gradients(mesh, slopes, piece, displacement)
+        motion = _inner(shape, lame[piece], slopes, volume)
+        turn = displacement_gradients(mesh, slopes, piece, displacement, motion)
         small = _strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
         large = _strain_operator(turn, slopes)
         m, q, k, _ = slopes.shape
@@ -68,9 +70,12 @@ def prestress_terms(
         stress = volume[:, :, None, None] * second_stress(lame[piece], turn, green)
         pulled = np.matmul(slopes, stress).transpose(0, 2, 1, 3).reshape(m, k, 3 * q)
         geometric = pulled @ slopes.transpose(0, 1, 3, 2).reshape(m, 3 * q, k)
-        places.add(stores[0], piece, _blocks(mixed + mixed.transpose(0, 2, 1)))
-        places.add(stores[1], piece, _blocks(square))
-        places.add(stores[2], piece, geometric[..., None])
+        store_blocks(places, stores[0], piece, condensed(mixed + mixed.transpose(0, 2, 1), motion))
+        store_blocks(places, stores[1], piece, condensed(square, motion))
+        if motion is None:
+            places.add(stores[2], piece, geometric[..., None])
+        else:
+            store_blocks(places, stores[2], piece, condensed(np.kron(geometric, np.eye(3)), motion))
     return PrestressTerms(*(places.matrix(store) for store in stores))
 
 
@@ -79,18 +84,32 @@ def internal_force(mesh: SolidMesh, material: Materials, shape: Shape, displacem
     force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
-        turn = displacement_gradients(mesh, slopes, piece, displacement)
+        motion = _inner(shape, lame[piece], slopes, volume)
+        turn = displacement_gradients(mesh, slopes, piece, displacement, motion)
         first = (np.eye(3) + turn) @ second_stress(lame[piece], turn, green=True)
         pull = np.einsum("mqac,mqkc,mq->mka", first, slopes, volume, optimize=True)
+        if motion is not None:
+            onto = motion.transpose(0, 2, 1) @ pull[:, shape.width :].reshape(len(pull), -1, 1)
+            pull = pull[:, : shape.width] + onto.reshape(len(pull), shape.width, 3)
         nodes = mesh.cells[piece].ravel()
         for axis in range(3):
             force[:, axis] += np.bincount(nodes, pull[..., axis].ravel(), minlength=len(force))
     return force
 
 
-def displacement_gradients(mesh: SolidMesh, slopes: FloatArray, piece: slice, displacement: FloatArray) -> FloatArray:
-    """Return (m, q, 3, 3) gradients ``∂u_a / ∂x_b`` of a displacement (nodes, 3) in a piece of the cells."""
-    moved = displacement[mesh.cells[piece]].transpose(0, 2, 1)
+def _inner(shape: Shape, lame: FloatArray, slopes: FloatArray, volume: FloatArray) -> FloatArray | None:
+    """Return the `inner_motion` of bricks with incompatible modes; None of other cells."""
+    return inner_motion(shape, cell_stiffness(lame, slopes, volume)) if shape.inner else None
+
+
+def displacement_gradients(
+    mesh: SolidMesh, slopes: FloatArray, piece: slice, displacement: FloatArray, motion: FloatArray | None = None
+) -> FloatArray:
+    """Return (m, q, 3, 3) gradients ``∂u_a / ∂x_b`` of a displacement (nodes, 3) in a piece of the cells.
+
+    `motion` is the `inner_motion` of bricks with incompatible modes.
+    """
+    moved = with_inner_modes(displacement[mesh.cells[piece]], motion).transpose(0, 2, 1)
     return np.asarray(moved[:, None] @ slopes)
 
 
@@ -124,12 +143,6 @@ def _elasticity(lame: FloatArray) -> FloatArray:
     return np.asarray(law[:, None])
 
 
-def _blocks(matrix: FloatArray) -> FloatArray:
-    """Return (m, 3k, 3k) as (m, k, k, 9) blocks of node pairs."""
-    m, k = len(matrix), matrix.shape[1] // 3
-    return matrix.reshape(m, k, 3, k, 3).transpose(0, 1, 3, 2, 4).reshape(m, k, k, 9)
-
-
 def strain_and_rotation(mesh: SolidMesh, displacement: FloatArray) -> tuple[float, float]:
     """Return the largest principal strain (a magnitude) and the largest rotation (rad) at the centres of the elements.
 
@@ -140,12 +153,13 @@ def strain_and_rotation(mesh: SolidMesh, displacement: FloatArray) -> tuple[floa
     displacement
         (nodes, 3) displacement in m.
     """
-    shape = shape_functions(mesh.cells.shape[1], 1)
     strain = rotation = 0.0
-    for piece in chunks(mesh, shape):
-        slopes, _ = gradients(mesh, shape, piece)
-        found = np.einsum("mkx,mqky->mqxy", displacement[mesh.cells[piece]], slopes)
-        turned = np.swapaxes(found, 2, 3)
-        strain = max(strain, float(np.linalg.norm(found + turned, 2, axis=(2, 3)).max()) / 2)
-        rotation = max(rotation, float(np.linalg.norm(found - turned, 2, axis=(2, 3)).max()) / 2)
+    for own in (group.mesh for group in cell_groups(mesh, EXACT)):
+        shape = shape_functions(own.cells.shape[1], 1)
+        for piece in chunks(own, shape):
+            slopes, _ = gradients(own, shape, piece)
+            found = np.einsum("mkx,mqky->mqxy", displacement[own.cells[piece]], slopes)
+            turned = np.swapaxes(found, 2, 3)
+            strain = max(strain, float(np.linalg.norm(found + turned, 2, axis=(2, 3)).max()) / 2)
+            rotation = max(rotation, float(np.linalg.norm(found - turned, 2, axis=(2, 3)).max()) / 2)
     return strain, rotation

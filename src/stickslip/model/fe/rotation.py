@@ -4,6 +4,7 @@ In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -15,10 +16,11 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
+from stickslip.model.fe.cell_matrices import hourglass_stiffness, inertia
+from stickslip.model.fe.elements import EXACT, CellGroup, NodeBlocks, Rules, cell_groups
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms
-from stickslip.model.fe.solid import Materials, integrate, node_dofs, support
+from stickslip.model.fe.solid import Materials, densities, integrate, lame_constants, node_dofs, support
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 
@@ -68,7 +70,7 @@ class RotatingSolid:
     moving
         (n,) position of each dof among the x, y, z of all nodes, node-major.
     nodal_mass
-        (nodes, nodes) ``∫ ρ N_i N_j`` in kg.
+        (nodes, nodes) ``∫ ρ N_i N_j`` in kg, without bricks that have incompatible modes.
     centrifugal
         (n,) centrifugal load at 1 rad/s, in N s².
     """
@@ -77,7 +79,7 @@ class RotatingSolid:
     mesh: SolidMesh
     material: Materials
     axis: Axis
-    quadrature: Quadrature
+    quadrature: Rules
     moving: IntArray
     nodal_mass: Matrix
     centrifugal: FloatArray
@@ -97,7 +99,17 @@ class RotatingSolid:
 
     def _of_mass(self, block: FloatArray) -> Matrix:
         """Return the matrix with `block` (3, 3), times the nodal mass, for each pair of nodes."""
-        return self._of_dofs(scipy.sparse.kron(self.nodal_mass, block, format="csr"))
+        whole = scipy.sparse.kron(self.nodal_mass, block, format="csr")
+        return self._of_dofs(with_inner_inertia(whole, self.mesh, self.material, self.quadrature, block))
+
+    @cached_property
+    def hourglass(self) -> Matrix | None:
+        """(n, n) share of hourglass control in the stiffness at rest; None without bricks of one integration point."""
+        groups = [group for group in self.cell_groups if group.rule.hourglass is not None]
+        if not groups:
+            return None
+        lame = lame_constants(self.mesh, self.material)
+        return self._of_dofs(sum(hourglass_stiffness(group, lame[group.rows]) for group in groups))
 
     @property
     def free(self) -> BoolArray:
@@ -219,18 +231,35 @@ class RotatingSolid:
         return replace(self.structure, stiffness=stiffness, damping=damping)
 
     @cached_property
-    def _places(self) -> NodeBlocks:
-        return NodeBlocks(self.mesh, self.free)
+    def cell_groups(self) -> list[CellGroup]:
+        """Cells by kind and quadrature."""
+        return cell_groups(self.mesh, self.quadrature)
 
     @cached_property
-    def _shape(self) -> Shape:
-        return shape_functions(self.mesh.cells.shape[1], self.quadrature.stiffness)
+    def _places(self) -> list[NodeBlocks]:
+        return [NodeBlocks(group.mesh, self.free) for group in self.cell_groups]
+
+    def _materials(self, group: CellGroup) -> Materials:
+        if isinstance(self.material, Sequence):
+            return [self.material[row] for row in group.rows]
+        return self.material
 
     def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
         where = self.at_nodes(displacement)
-        terms = prestress_terms(self.mesh, self.material, self._shape, self._places, where, green=green)
-        parts = (terms.linear, terms.quadratic, terms.geometric)
+        parts: list[Matrix] = []
+        for group, places in zip(self.cell_groups, self._places, strict=True):
+            terms = prestress_terms(group.mesh, self._materials(group), group.strain, places, where, green=green)
+            own = (terms.linear, terms.quadratic, terms.geometric)
+            parts = [a + b for a, b in zip(parts, own, strict=True)] if parts else [*own]
         return PrestressTerms(*(self._of_dofs(part) for part in parts))
+
+    def _inner_force(self, displacement: FloatArray) -> FloatArray:
+        where = self.at_nodes(displacement)
+        found = np.zeros_like(where)
+        for group in self.cell_groups:
+            found += internal_force(group.mesh, self._materials(group), group.strain, where)
+        force: FloatArray = found.ravel()[self.moving]
+        return force if self.hourglass is None else force + self.hourglass @ displacement
 
     def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
         """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
@@ -250,9 +279,7 @@ class RotatingSolid:
         displacement, S = start, self.spin_softening
         goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))
         for _ in range(NEWTON_STEPS):
-            where = self.at_nodes(displacement)
-            inner = internal_force(self.mesh, self.material, self._shape, where)
-            inner = inner.ravel()[self.moving]
+            inner = self._inner_force(displacement)
             outer = speed**2 * (self.centrifugal + S @ displacement)
             terms = self._terms(displacement, green=True)
             stiffness = self.structure.stiffness + terms.linear + terms.quadratic + terms.geometric
@@ -280,7 +307,7 @@ def rotating_solid(
     *,
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
-    quadrature: Quadrature = EXACT,
+    quadrature: Rules = EXACT,
 ) -> RotatingSolid:
     """Assemble a solid that rotates about an axis together with its supports.
 
@@ -306,8 +333,23 @@ def rotating_solid(
     structure, moving = support(mesh, mass, stiffness, clamped, held)
     # positions are interpolated like displacements, so the mass matrix integrates the load exactly
     load = (mass @ axis.arm(mesh.points).ravel())[moving]
-    nodal_mass = scipy.sparse.csr_array(mass[::3][:, ::3])
+    own = with_inner_inertia(mass, mesh, material, quadrature, -np.eye(3))
+    nodal_mass = scipy.sparse.csr_array(own[::3][:, ::3])
     return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load)
+
+
+def with_inner_inertia(
+    matrix: Matrix, mesh: SolidMesh, material: Materials, quadrature: Rules, block: FloatArray
+) -> Matrix:
+    """Add the inertia of bricks with incompatible modes, with `block` (3, 3), to a matrix (3n, 3n) of all nodes.
+
+    Their mass couples the directions, so it is no nodal mass times a block.
+    """
+    groups = [group for group in cell_groups(mesh, quadrature) if group.rule.inner]
+    if not groups:
+        return matrix
+    lame, density = lame_constants(mesh, material), densities(mesh, material)
+    return matrix + sum(inertia(group, lame[group.rows], density[group.rows], block) for group in groups)
 
 
 def _content(tie: Matrix | None) -> str:

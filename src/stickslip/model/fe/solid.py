@@ -1,4 +1,4 @@
-"""Linear elastic solids: consistent mass and stiffness of tetrahedra and hexahedra.
+"""Linear elastic solids: consistent mass and stiffness.
 
 scikit-fem is imported only when a solid is assembled.
 """
@@ -12,8 +12,18 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
-from stickslip.model.fe.elements import EXACT, Quadrature, check_jacobians, library, library_element, shape_functions
-from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
+from stickslip.model.fe.cell_matrices import assemble_cells, is_plain
+from stickslip.model.fe.elements import (
+    EXACT,
+    CellGroup,
+    Quadrature,
+    Rules,
+    cell_groups,
+    check_jacobians,
+    library,
+    library_element,
+)
+from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.structure import Structure, nodal_dofs
 from stickslip.units import check_quantities, quantity
 
@@ -57,7 +67,7 @@ def assemble_solid(
     *,
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
-    quadrature: Quadrature = EXACT,
+    quadrature: Rules = EXACT,
 ) -> Structure:
     """Assemble mass and stiffness, with the nodes of the sets `clamped` removed.
 
@@ -72,7 +82,7 @@ def assemble_solid(
     held
         (nodes, 3) further supported components x, y, z.
     quadrature
-        Quadrature rules; the default integrates straight-edged cells exactly.
+        Quadrature, or a list of m, one for each cell; the default integrates straight-edged cells exactly.
 
     Returns
     -------
@@ -145,27 +155,41 @@ def node_dofs(nodes: IntArray) -> IntArray:
     return np.asarray((3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
 
-def integrate(mesh: SolidMesh, material: Materials, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
+def integrate(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[Matrix, Matrix]:
     """Return mass and stiffness of the free body, dofs node-major in the mesh's own order."""
     check_nodes(mesh)
-    for degree in {quadrature.stiffness, quadrature.mass}:
-        check_jacobians(mesh, shape_functions(mesh.cells.shape[1], degree))
+    groups = cell_groups(mesh, quadrature)
+    for group in groups:
+        for degree in {group.rule.stiffness: group.strain, group.rule.mass: group.inertia}.values():
+            check_jacobians(group.mesh, degree)
     check_shared(mesh)
-    if isinstance(material, Material):
-        return _integrate(mesh, material, quadrature)
+    if isinstance(material, Material) and len(groups) == 1:
+        return _integrate(groups[0], material)
     n = 3 * len(mesh.points)
     mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
-    known = list(dict.fromkeys(material))
-    which = np.array([known.index(m) for m in _of_cells(mesh, material)])
+    known = [material] if isinstance(material, Material) else list(dict.fromkeys(material))
+    which = np.zeros(len(mesh.cells), dtype=np.int64)
+    if not isinstance(material, Material):
+        which = np.array([known.index(m) for m in _of_cells(mesh, material)])
     for index, one in enumerate(known):
-        cells = mesh.cells[which == index]
-        nodes, local = np.unique(cells, return_inverse=True)
-        part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
-        rows = node_dofs(nodes)
-        place = scipy.sparse.csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows)))
-        M, K = _integrate(part, one, quadrature)
-        mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
+        for group in groups:
+            cells = group.mesh.cells[which[group.rows] == index]
+            if not len(cells):
+                continue
+            nodes, local = np.unique(cells, return_inverse=True)
+            part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
+            rows = node_dofs(nodes)
+            place = scipy.sparse.csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows)))
+            M, K = _integrate(cell_groups(part, group.rule)[0], one)
+            mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
     return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
+
+
+def densities(mesh: SolidMesh, material: Materials) -> FloatArray:
+    """Return the density of each cell, (m,), in kg/m³."""
+    if isinstance(material, Material):
+        return np.full(len(mesh.cells), material.density)
+    return np.array([one.density for one in _of_cells(mesh, material)])
 
 
 def lame_constants(mesh: SolidMesh, material: Materials) -> FloatArray:
@@ -185,12 +209,15 @@ def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Materia
     return material
 
 
-def _integrate(mesh: SolidMesh, material: Material, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
+def _integrate(group: CellGroup, material: Material) -> tuple[Matrix, Matrix]:
     """Integrate a body of one material.
 
     Both matrices are built from scalar integrals, ``∫ φ_p φ_q`` and ``D_ab = ∫ ∂_a φ_p ∂_b φ_q``:
     ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. This costs a fraction of the vector-valued form.
     """
+    mesh, quadrature = group.mesh, group.rule
+    if not is_plain(group):
+        return assemble_cells(group, lame_constants(mesh, material), densities(mesh, material))
     bases, theirs = _bases(mesh, quadrature)
 
     def assemble(integrand: Callable[..., FloatArray], degree: int) -> Matrix:
@@ -247,27 +274,34 @@ def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], Int
 
 def check_shared(mesh: SolidMesh) -> None:
     """Refuse edges of the same two corners with different mid-side nodes, and corners that are mid-side nodes."""
-    width = mesh.cells.shape[1]
-    corners = 4 if width in (4, 10) else 8
-    if width == corners:
-        return
-    edges = TET_EDGES if corners == 4 else HEX_EDGES
-    ends = np.sort(mesh.cells[:, np.array(edges)].reshape(-1, 2), axis=1)
-    middle = mesh.cells[:, corners:].ravel()
-    key = ends[:, 0] * len(mesh.points) + ends[:, 1]
-    _, first, edge = np.unique(key, return_index=True, return_inverse=True)
+    ends, middle, owners = [], [], []
     is_corner = np.zeros(len(mesh.points), dtype=bool)
-    is_corner[mesh.cells[:, :corners]] = True
+    for width, rows in by_kind(mesh.cells):
+        corners = CORNERS[width]
+        is_corner[mesh.cells[rows, :corners]] = True
+        if width > corners:
+            own = mesh.cells[rows, :width]
+            ends.append(np.sort(own[:, np.array(EDGES[corners])].reshape(-1, 2), axis=1))
+            middle.append(own[:, corners:].ravel())
+            owners.append(np.repeat(rows, width - corners))
+    if ends:
+        _check_middles(mesh, np.vstack(ends), np.concatenate(middle), np.concatenate(owners), is_corner)
+
+
+def _check_middles(mesh: SolidMesh, ends: IntArray, middle: IntArray, owners: IntArray, is_corner: BoolArray) -> None:
+    """Check the mid-side nodes (e,) of edges between corners (e, 2), of the cells `owners`."""
+    key = ends[:, 0] * len(mesh.points) + ends[:, 1]
+    _, first, which = np.unique(key, return_index=True, return_inverse=True)
     # a node in the middle of several edges keeps the last one here, so the others differ from it
     owner = np.zeros(len(mesh.points), dtype=np.int64)
-    owner[middle] = edge
-    wrong = (middle[first][edge] != middle) | is_corner[middle] | (owner[middle] != edge)
+    owner[middle] = which
+    wrong = (middle[first][which] != middle) | is_corner[middle] | (owner[middle] != which)
     if wrong.any():
-        cell, place = divmod(int(np.flatnonzero(wrong)[0]), len(edges))
+        edge = int(np.flatnonzero(wrong)[0])
         raise input_error(
             "mesh",
             "neighbours do not share their mid-side nodes, or one has a node that is a corner or the middle of another edge: "
-            f"node {mesh.numbers[mesh.cells[cell, corners + place]]} of cell {mesh.cell_numbers[cell]}",
+            f"node {mesh.numbers[middle[edge]]} of cell {mesh.cell_numbers[owners[edge]]}",
             "Merge coincident nodes, and use cells of one order, their nodes in VTK's order.",
         )
 

@@ -5,7 +5,7 @@ materials, supports, ties and steps; and with only NumPy and SciPy installed it 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,18 +15,22 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.elements import Quadrature
+from stickslip.model.fe.elements import EXACT, Quadrature, Rules
 from stickslip.model.fe.solid import Material, integrate, node_dofs
-from stickslip.model.mesh.solid_mesh import HEX_EDGES, TET_EDGES, SolidMesh
+from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, keyword_blocks, unique_in_order, whole_number
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
 from stickslip.model.structure import Structure, nodal_dofs
 
-# corners of the faces S1, S2, …, counted from 0
-TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+# corners of the faces S1, S2, …, counted from 0, by number of corners of a cell
+FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    5: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
 
 
 def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
@@ -91,23 +95,26 @@ def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, plac
 
 def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
     """Return the nodes of ``element or set, face``, e.g. ``SIDE, S3``."""
-    count = model.cells.shape[1] - 1
-    faces = TET_FACES if count in (4, 10) else HEX_FACES
-    face = fields[1].upper() if len(fields) > 1 else ""
-    if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
-        raise input_error(place, f"{face!r} is no face of {model.element_type}", f"Write S1 to S{len(faces)}.")
-    corners = faces[int(face[1:]) - 1]
-    edges = TET_EDGES if count == 10 else HEX_EDGES if count == 20 else ()
-    first = 4 if count == 10 else 8
-    middles = [first + i for i, ends in enumerate(edges) if set(ends) <= set(corners)]
     if fields[0].upper() in model.element_sets:
         numbers = model.element_sets[fields[0].upper()]
     else:
         numbers = np.array([whole_number(fields[0], place, "element")])
-    rows = model.cells[np.isin(model.cells[:, 0], numbers)]
+    rows = np.flatnonzero(np.isin(model.cells[:, 0], numbers))
     if not len(rows):
         raise unknown(place, "element or element set", fields[0], list(model.element_sets))
-    return np.asarray(rows[:, [1 + i for i in (*corners, *middles)]].ravel(), dtype=np.int64)
+    face = fields[1].upper() if len(fields) > 1 else ""
+    found = []
+    for width, own in by_kind(model.cells[rows, 1:]):
+        faces = FACES[CORNERS[width]]
+        if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
+            raise input_error(
+                place, f"{face!r} is no face of {model.kinds[rows[own[0]]]}", f"Write S1 to S{len(faces)}."
+            )
+        corners = faces[int(face[1:]) - 1]
+        edges = EDGES[CORNERS[width]] if width > CORNERS[width] else ()
+        middles = [CORNERS[width] + i for i, ends in enumerate(edges) if set(ends) <= set(corners)]
+        found.append(model.cells[rows[own]][:, [1 + i for i in (*corners, *middles)]].ravel())
+    return np.concatenate(found).astype(np.int64)
 
 
 PAIRED = 1e-3  # largest distance between a rotated cyclic face and the other face, over the size of the face
@@ -123,8 +130,8 @@ class Deck:
     mesh
         Cells and their nodes. Node sets: the deck's sets without clamped nodes; ``root``, the clamped nodes; with cyclic
         symmetry ``cyclic_low`` and ``cyclic_high``. The low face, rotated by one pitch, coincides with the high face.
-    element_type
-        Element type of the deck, e.g. ``C3D10``.
+    cell_types
+        (m,) element type of each cell in the deck's words, e.g. ``C3D10``.
     materials
         Name -> material.
     cell_material
@@ -141,10 +148,12 @@ class Deck:
         Ignored keywords and loads, with their lines.
     clamped_sets
         Names of the deck's sets whose nodes are all clamped, which are therefore missing in the mesh.
+    of_abaqus
+        Whether the deck has keywords that Abaqus alone has (``*PART``, ``*ASSEMBLY``, ``*PREPRINT``).
     """
 
     mesh: SolidMesh
-    element_type: str
+    cell_types: tuple[str, ...]
     materials: Mapping[str, Material]
     cell_material: tuple[str, ...]
     held: BoolArray
@@ -153,6 +162,12 @@ class Deck:
     sectors: int | None
     ignored: tuple[str, ...]
     clamped_sets: tuple[str, ...] = ()
+    of_abaqus: bool = False
+
+    @property
+    def element_type(self) -> str:
+        """Element types of the deck, e.g. ``C3D10`` or ``C3D20R, C3D15``."""
+        return ", ".join(dict.fromkeys(self.cell_types))
 
     @property
     def material(self) -> Material:
@@ -163,20 +178,48 @@ class Deck:
         return self.materials[used[0]]
 
     @property
-    def quadrature(self) -> Quadrature:
-        """CalculiX's quadrature rules for the element type; exact rules where the quadrature is not the only difference."""
-        return QUADRATURES.get(self.element_type, Quadrature())
+    def quadrature(self) -> Rules:
+        """CalculiX's rules for the element types; exact rules where the quadrature is not the only difference."""
+        return self._rules(lambda kind: QUADRATURES.get(kind, EXACT))
+
+    def exact(self, hourglass: float | None = None) -> Rules:
+        """Return exact integration; C3D8I have incompatible modes and C3D8R one point and hourglass control all the same.
+
+        `hourglass` is the factor of the hourglass stiffness; None: CalculiX's or Abaqus's, by the kind of deck.
+        """
+        return self._rules(lambda kind: EXACT_BRICKS.get(kind, EXACT), hourglass)
+
+    def calculix(self, hourglass: float | None = None) -> Rules:
+        """Return the rules of `quadrature` with another factor of the hourglass stiffness."""
+        return self._rules(lambda kind: QUADRATURES.get(kind, EXACT), hourglass)
+
+    def _rules(self, rule_of: Callable[[str], Quadrature], hourglass: float | None = None) -> Rules:
+        factor = (HOURGLASS_ABAQUS if self.of_abaqus else HOURGLASS_CALCULIX) if hourglass is None else hourglass
+        known = {kind: rule_of(kind) for kind in dict.fromkeys(self.cell_types)}
+        known = {k: r if r.hourglass is None else replace(r, hourglass=factor) for k, r in known.items()}
+        if len(set(known.values())) == 1:
+            return next(iter(known.values()))
+        return tuple(known[kind] for kind in self.cell_types)
 
 
+HOURGLASS_CALCULIX, HOURGLASS_ABAQUS = 5e-4, 5e-3  # of Young's modulus
 # determined by comparison with matrices stored by CalculiX 2.20, which agree to 2e-14
 QUADRATURES = {
     "C3D4": Quadrature(stiffness=1, mass=1),
     "C3D10": Quadrature.calculix(),
     "C3D10T": Quadrature.calculix(),
+    "C3D6": Quadrature(stiffness=1, mass=1, axial=3),
+    "C3D15": Quadrature(stiffness=2, mass=2, axial=5),
     "C3D8": Quadrature(stiffness=3, mass=3),
+    "C3D8I": Quadrature(stiffness=3, mass=3, inner="centre"),
+    "C3D8R": Quadrature(stiffness=1, mass=1, hourglass=HOURGLASS_CALCULIX),
     "C3D20": Quadrature(stiffness=5, mass=5),
     "C3D20R": Quadrature(stiffness=3, mass=3),
 }
+# bricks that are other elements than the plain one. C3D8I with exact mass, and distorted bricks pass the patch test; C3D8R has its
+# mass at one point, too.
+EXACT_BRICKS = {"C3D8I": Quadrature(stiffness=3, mass=4, inner="mean"), "C3D8R": QUADRATURES["C3D8R"]}
+ABAQUS_WORDS = {"PART", "ASSEMBLY", "PREPRINT"}  # keywords that CalculiX does not have
 
 
 def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = (), plausible: bool = True) -> Deck:
@@ -223,12 +266,13 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     node_sets = {name: nodes for name, nodes in free_sets.items() if nodes.size}
     if root.any():
         node_sets["root"] = np.flatnonzero(root)
-    if model.element_type not in QUADRATURES:
-        model.ignored.append(f"what makes {model.element_type} another element than its plain kind")
+    for kind in dict.fromkeys(model.kinds):
+        if kind not in (*QUADRATURES, "C3D5"):
+            model.ignored.append(f"what makes {kind} another element than its plain kind")
     square = model.speed_squares[-1] if model.speed_squares else None
     return Deck(
         replace(mesh, node_sets=node_sets),
-        model.element_type,
+        model.kinds,
         materials,
         _cell_materials(model),
         held,
@@ -237,6 +281,7 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
         model.sectors,
         tuple(model.ignored),
         tuple(name for name, nodes in free_sets.items() if not nodes.size),
+        any(block.keyword in ABAQUS_WORDS for block in blocks),
     )
 
 
@@ -253,19 +298,8 @@ def assemble_deck(deck: Deck) -> Structure:
     Structure
         Sparse, undamped. Each node set becomes a set of dofs, without supported ones.
     """
-    rules = deck.quadrature
-    n = 3 * len(deck.mesh.points)
-    mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
-    of_cell = np.array(deck.cell_material)
-    for name in dict.fromkeys(deck.cell_material):
-        cells = deck.mesh.cells[of_cell == name]
-        nodes, local = np.unique(cells, return_inverse=True)
-        part = SolidMesh(deck.mesh.points[nodes], local.reshape(cells.shape), {})
-        place = scipy.sparse.csr_array(
-            (np.ones(3 * len(nodes)), (node_dofs(nodes), np.arange(3 * len(nodes)))), shape=(n, 3 * len(nodes))
-        )
-        M, K = integrate(part, deck.materials[name], rules)
-        mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
+    mass, stiffness = integrate(deck.mesh, [deck.materials[name] for name in deck.cell_material], deck.quadrature)
+    n = mass.shape[0]
     free = np.flatnonzero(~deck.held.ravel())
     new = np.full(n, -1)
     new[free] = np.arange(len(free))
@@ -326,13 +360,16 @@ def _cell_materials(model: DeckModel) -> tuple[str, ...]:
 
 def _mesh(model: DeckModel, units: Units) -> tuple[SolidMesh, IntArray]:
     """Return the mesh without sets, and the rows of the nodes that it kept."""
-    rows = model.nodes.index(model.cells[:, 1:].ravel())
-    kept, cells = np.unique(rows, return_inverse=True)
+    own = model.cells[:, 1:] >= 0
+    rows = model.nodes.index(model.cells[:, 1:][own])
+    kept, nodes = np.unique(rows, return_inverse=True)
+    cells = np.full(own.shape, -1)
+    cells[own] = nodes
     if len(kept) < len(model.nodes.numbers):
         model.ignored.append(f"{len(model.nodes.numbers) - len(kept)} nodes that belong to no cell")
     mesh = SolidMesh(
         units.length * model.nodes.points[kept],
-        cells.reshape(len(model.cells), -1),
+        cells,
         {},
         numbers=model.nodes.numbers[kept],
         cell_numbers=model.cells[:, 0],

@@ -9,7 +9,6 @@ from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.deck_words import (
     DAMPING,
-    OTHER_BRICKS,
     PARAMETERS,
     PASSING_CONDITIONS,
     REFUSED,
@@ -19,19 +18,32 @@ from stickslip.model.readers.deck_words import (
 from stickslip.model.readers.keywords import Block, members, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import NodeTable
 
-NODES_OF = {"C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10, "C3D8": 8, "C3D20": 20, "C3D20R": 20}
+NODES_OF = {
+    "C3D4": 4,
+    "C3D10": 10,
+    "C3D10M": 10,
+    "C3D10T": 10,
+    "C3D5": 5,
+    "C3D6": 6,
+    "C3D15": 15,
+    "C3D8": 8,
+    "C3D8I": 8,
+    "C3D8R": 8,
+    "C3D20": 20,
+    "C3D20R": 20,
+}
 
 
 @dataclass
 class DeckModel:
     """Supported content of a deck, in its own numbers and units.
 
-    Cells are rows ``number, nodes…``; sections are pairs of material and element set; ``fixed`` holds nodes by
+    Cells are rows ``number, nodes…``, which -1 fills to the widest; ``kinds`` has the type of each; sections are pairs of material and element set; ``fixed`` holds nodes by
     component ``x``, ``y``, ``z``; speeds are squares of circular frequencies.
     """
 
     nodes: NodeTable
-    element_type: str = ""
+    kinds: tuple[str, ...] = ()
     cells: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     element_sets: dict[str, IntArray] = field(default_factory=dict)
     elastic: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -125,8 +137,8 @@ def _refused(block: Block) -> InputError:
 
 
 def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
-    """Read elements, all with the same count of nodes, and the element sets."""
-    parts, named = [], dict[str, list[IntArray]]()
+    """Read elements of all kinds, and the element sets."""
+    parts, kinds, named = [], list[str](), dict[str, list[IntArray]]()
     for block in blocks:
         if block.keyword != "ELEMENT":
             continue
@@ -135,30 +147,19 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
         if kind not in NODES_OF and "ELEMENT" in passed:
             model.ignored.append(f"elements {kind} ({block.path.name}: line {block.line}), as asked")
             continue
-        if kind in OTHER_BRICKS:
-            what, remedy = OTHER_BRICKS[kind]
-            raise input_error(
-                block.place,
-                f"elements of type {kind} have {what}, which are not read; plain bricks in their place are too stiff in bending",
-                remedy,
-            )
         if kind not in NODES_OF:
             raise unread(block, f"elements of type {kind} are not read")
         count = NODES_OF[kind]
-        model.element_type = model.element_type or kind
-        if kind != model.element_type:
-            raise input_error(
-                block.place,
-                f"elements of type {kind} beside {model.element_type}",
-                "Use one type a deck: C3D4, C3D10, C3D8 or C3D20.",
-            )
         rows = np.array(list(_connectivity(block, count)), dtype=np.int64).reshape(-1, count + 1)
         parts.append(rows)
+        kinds += [kind] * len(rows)
         if "ELSET" in block.parameters:
             named.setdefault(block.parameters["ELSET"].upper(), []).append(rows[:, 0])
     if not sum(map(len, parts)):
         raise input_error(model.nodes.place, "has no *ELEMENT", "Give the deck with the mesh, solid elements.")
-    model.cells = np.vstack(parts)
+    widest = max(rows.shape[1] for rows in parts)
+    model.cells = np.vstack([np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), constant_values=-1) for rows in parts])
+    model.kinds = tuple(kinds)
     if len(np.unique(model.cells[:, 0])) < len(model.cells):
         number, times = np.unique(model.cells[:, 0], return_counts=True)
         raise input_error(model.nodes.place, f"defines element {number[times > 1][0]} twice", "Give it once.")
@@ -178,7 +179,7 @@ def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
             rows = model.cells[np.isin(model.cells[:, 0], model.element_sets[elements]), 1:]
             name = block.parameter("NSET").upper()
             known = sets.get(name, np.empty(0, dtype=np.int64))
-            sets[name] = unique_in_order(np.concatenate([known, np.sort(rows.ravel())]))
+            sets[name] = unique_in_order(np.concatenate([known, np.sort(rows[rows >= 0])]))
     model.nodes = replace(model.nodes, node_sets=sets)
 
 

@@ -201,11 +201,3 @@ REFUSED = frozenset(
         "INITIAL STRAIN INCREASE",
     }
 )
-# Bricks with other matrices than a plain solid: their difference, and the remedy
-OTHER_BRICKS = {
-    "C3D8I": ("incompatible modes", "Mesh with C3D20R, C3D20 or C3D10."),
-    "C3D8R": (
-        "one integration point and hourglass control",
-        "Mesh with C3D20R, C3D20 or C3D10, or let the solver write its matrices and read these.",
-    ),
-}

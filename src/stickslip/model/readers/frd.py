@@ -14,9 +14,17 @@ from stickslip.model.readers.node_table import NodeTable, node_table
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
 from stickslip.model.readers.units import SI, Units
 
-# element type -> position of each of VTK's nodes in the file, which lists a brick's vertical edges before its top ones
+# element type -> position of each of VTK's nodes in the file, which lists vertical edges before top ones
 HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
-CELLS: dict[int, tuple[int, ...]] = {1: tuple(range(8)), 3: tuple(range(4)), 4: HEX20, 6: tuple(range(10))}
+WEDGE15 = (*range(9), 12, 13, 14, 9, 10, 11)
+CELLS: dict[int, tuple[int, ...]] = {
+    1: tuple(range(8)),
+    2: tuple(range(6)),
+    3: tuple(range(4)),
+    4: HEX20,
+    5: WEDGE15,
+    6: tuple(range(10)),
+}
 WIDTHS = {0: 5, 1: 10}  # characters of a node number in the short and the long format
 VALUE = 12  # characters of a value
 PER_LINE = 6  # values on a line
@@ -64,7 +72,7 @@ class FrdResults:
     Parameters
     ----------
     mesh
-        Nodes and cells; None if the cells are shells, beams, wedges or of several kinds.
+        Nodes and cells; None if there are shells or beams.
     nodes
         Node numbers and positions in metres.
     fields
@@ -119,12 +127,16 @@ def frd_nodes(path: Path) -> NodeTable:
 
 
 def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]]) -> SolidMesh | None:
-    if len(cells) != 1 or not set(cells) <= set(CELLS):
+    if not cells or not set(cells) <= set(CELLS):
         return None
-    ((kind, rows),) = cells.items()
-    table = np.array(rows, dtype=np.int64)
-    connected = nodes.index(table[:, 1:].ravel()).reshape(len(rows), -1)[:, list(CELLS[kind])]
-    return SolidMesh(nodes.points, connected, {}, numbers=nodes.numbers, cell_numbers=table[:, 0])
+    widest = max(len(CELLS[kind]) for kind in cells)
+    parts, numbers = [], []
+    for kind, rows in cells.items():
+        table = np.array(rows, dtype=np.int64)
+        connected = nodes.index(table[:, 1:].ravel()).reshape(len(rows), -1)[:, list(CELLS[kind])]
+        parts.append(np.pad(connected, ((0, 0), (0, widest - connected.shape[1])), constant_values=-1))
+        numbers.append(table[:, 0])
+    return SolidMesh(nodes.points, np.vstack(parts), {}, numbers=nodes.numbers, cell_numbers=np.concatenate(numbers))
 
 
 def _in_si(field: NodalField, modal: bool, units: Units) -> NodalField:

@@ -12,6 +12,11 @@ from stickslip.study.exchange.motion import Motion, numbers_of
 from stickslip.study.store.atomic_write import write_whole
 
 KINDS = {len(places): kind for kind, places in CELLS.items()}  # nodes of a cell -> element type
+# the format has no pyramids: they are bricks whose upper face is one node
+BRICKS = {
+    5: (0, 1, 2, 3, 4, 4, 4, 4),
+    13: (0, 1, 2, 3, 4, 4, 4, 4, 5, 6, 7, 8, 4, 4, 4, 4, 9, 10, 11, 12),
+}
 PER_LINE = 10  # nodes of an element in a line
 
 
@@ -53,9 +58,11 @@ def _mesh(motion: Motion, units: Units) -> Iterator[str]:
     for body, own, numbers in zip(motion.bodies, nodes, cells, strict=True):
         if body.nodes.cells is None:
             continue
-        kind = KINDS[body.nodes.cells.shape[1]]
-        table = own[body.nodes.cells[:, np.argsort(CELLS[kind])]]
-        for number, row in zip(numbers, table, strict=True):
+        for row_nodes, number in zip(body.nodes.cells, numbers, strict=True):
+            row = row_nodes[row_nodes >= 0]
+            row = row[list(BRICKS.get(len(row), range(len(row))))]
+            kind = KINDS[len(row)]
+            row = own[row[np.argsort(CELLS[kind])]]
             yield f" -1{number:10d}{kind:5d}{0:5d}{1:5d}"
             for first in range(0, row.size, PER_LINE):
                 yield " -2" + "".join(f"{node:10d}" for node in row[first : first + PER_LINE])

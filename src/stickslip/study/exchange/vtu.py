@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import missing_package
-from stickslip.model.mesh.solid_mesh import CELL_NAMES
+from stickslip.model.mesh.solid_mesh import by_kind, cell_blocks
 from stickslip.study.exchange.contacts import ContactMotion
 from stickslip.study.exchange.motion import Motion
 from stickslip.study.store.atomic_write import whole_file, write_whole
@@ -90,8 +90,9 @@ def _cells(motion: Motion) -> tuple[Cells, dict[str, list[IntArray]]]:
             cells.append(("vertex", np.arange(count)[:, None] + first))
             numbers.append(own.numbers)
         else:
-            cells.append((CELL_NAMES[own.cells.shape[1]], own.cells + first))
-            numbers.append(own.cell_numbers)
+            for (name, nodes), (_, rows) in zip(cell_blocks(own.cells), by_kind(own.cells), strict=True):
+                cells.append((name, nodes + first))
+                numbers.append(own.cell_numbers[rows])
         first += count
     return cells, {"element": numbers}
 

@@ -13,6 +13,7 @@ from stickslip.errors import InputError, input_error, nearest_and_known
 from stickslip.model.axis import Axis
 from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
+from stickslip.model.fe.hourglass import hourglass_doubts
 from stickslip.model.fe.solid import Material, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
@@ -196,7 +197,7 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, o
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
-    return _solid(
+    part = _solid(
         key,
         table,
         deck.mesh,
@@ -204,12 +205,19 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, o
         sectors,
         deck.axis,
         held=deck.held if partly.any() else None,
-        quadrature=deck.quadrature if table.quadrature == "calculix" else EXACT,
+        quadrature=deck.calculix(table.hourglass) if table.quadrature == "calculix" else deck.exact(table.hourglass),
         clamped_sets=deck.clamped_sets,
         warnings=(*(f"{table.file}: passed over {text}" for text in deck.ignored),),
         own_speed=deck.speed or 0.0,
         **others,
     )
+    if part.solid is None:
+        return part
+    cut = np.zeros(len(deck.mesh.points), dtype=bool)
+    for face in part.faces if part.sectors > 1 else ():
+        cut[part.solid.mesh.node_sets.get(face, np.zeros(0, dtype=np.int64))] = True
+    said = (f"{table.file}: {text}" for text in hourglass_doubts(part.solid, cut | ~part.solid.free))
+    return replace(part, warnings=(*part.warnings, *said))
 
 
 def _materials(deck: Deck) -> Materials:

@@ -223,6 +223,12 @@ class FileModel(PartTable):
         "exact",
         description="integration of a mesh's matrices: exact, or calculix (the rules of that program, for comparisons)",
     )
+    hourglass: float | None = Field(
+        None,
+        gt=0,
+        le=1,
+        description="hourglass stiffness of C3D8R bricks as a fraction of Young's modulus; left out: 0.0005, as CalculiX, or 0.005 for a deck of Abaqus (*PART, *ASSEMBLY)",
+    )
     mesh: FilePath | None = Field(
         None,
         description="beside matrices without coordinates: the mesh file with the nodes and their sets (.inp for CalculiX's .sti)",
