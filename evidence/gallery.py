@@ -12,7 +12,7 @@ from pathlib import Path
 from evidence.baseline.studies import examples
 from evidence.baseline.trees import ROOT
 from stickslip import Result
-from stickslip.report.paper.file import write_figure
+from stickslip.report.paper.figure import write_figure
 
 PICTURES = ROOT / "docs" / "images" / "paper"
 # example -> its figures on the page

@@ -18,7 +18,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.all_motions import MotionSearch, all_motions, share_interval
 from stickslip.response.all_motions.basins import APERIODIC, DIVERGED
-from stickslip.response.all_motions.options import search_problem
+from stickslip.response.all_motions.found import search_problem
 from stickslip.response.all_motions.search import search_stages
 from stickslip.response.system import System
 

@@ -10,7 +10,7 @@ import scipy
 
 import stickslip as ss
 from evidence.judges.planar_contact import Contact, growing, judged
-from stickslip.assembly.joints.frames import direction, told_apart
+from stickslip.assembly.joints.pairs import direction, told_apart
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.law import OPEN, PAIRS, SLIP, STICK
 from stickslip.contact.steps.coupled_coulomb import turned

@@ -16,11 +16,10 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb, weighted_products
 from stickslip.errors import InputError
 from stickslip.harmonic.balance import harmonic_balance
-from stickslip.harmonic.dlft import dynamic_lagrangian
+from stickslip.harmonic.dlft import RigidJacobian, dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import to_complex
-from stickslip.harmonic.rigid_jacobian import RigidJacobian
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 from stickslip.solve.continuation import Following, StepControl, start_point, trace

@@ -8,8 +8,7 @@ import pytest
 import xarray as xr
 from synthetic_result import synthetic_result, tree_of
 
-from stickslip.study.store.netcdf import attributes_there, read_tree, write_tree
-from stickslip.study.store.netcdf4_file import of_file
+from stickslip.study.store.netcdf import attributes_there, of_file, read_tree, write_tree
 
 
 def odd_tree() -> xr.DataTree:

@@ -19,8 +19,7 @@ from typer.testing import CliRunner
 from stickslip import Result
 from stickslip.cli import app
 from stickslip.errors import InputError, StickslipError
-from stickslip.report.paper.figure import draw, on_paper
-from stickslip.report.paper.file import STYLE, inches, write_figure
+from stickslip.report.paper.figure import STYLE, draw, inches, on_paper, write_figure
 from stickslip.report.paper.looks import worded
 
 COLUMN = 85 / 25.4  # inches
@@ -146,7 +145,7 @@ def test_a_missing_matplotlib_is_told_with_its_extra(result: Result, monkeypatch
 
 
 def test_matplotlib_is_loaded_only_when_a_figure_is_drawn() -> None:
-    code = "import sys, stickslip.api.result, stickslip.report.paper.file; sys.exit('matplotlib' in sys.modules)"
+    code = "import sys, stickslip.api.result, stickslip.report.paper.figure; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stickslip.response.continuation.adaptive_continuation import RUN_BACK, turned_for_nothing
 from stickslip.response.continuation.branch import Curve, Followed, Judged, Route
-from stickslip.response.continuation.continuation_steps import RUN_BACK, turned_for_nothing
 from stickslip.solve.continuation import Point
 
 ROUTE = Route(first=0.0, last=40.0, points=40)

@@ -58,7 +58,7 @@ def export_figure(result: Path, name: str, to: Path | None, width: str, style: s
     to
         The file; None: ``NAME.pdf`` in the current folder.
     width, style
-        See `stickslip.report.paper.file.write_figure`.
+        See `stickslip.report.paper.figure.write_figure`.
     case
         The case shown where the page has buttons for it; None: as on the page.
 
@@ -68,7 +68,7 @@ def export_figure(result: Path, name: str, to: Path | None, width: str, style: s
         If there is no such figure, or it cannot be drawn or written.
     """
     from stickslip.analyses.page import plots
-    from stickslip.report.paper.file import write_figure
+    from stickslip.report.paper.figure import write_figure
     from stickslip.report.result import open_result
 
     figures = plots(open_result(result))

@@ -17,7 +17,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.all_motions.basins import not_marched
-from stickslip.response.all_motions.options import MotionSearch, search_problem
+from stickslip.response.all_motions.found import MotionSearch, search_problem
 from stickslip.response.forced.problem import ForcedProblem
 from stickslip.study.analysis import Case
 from stickslip.units import HZ, RPM

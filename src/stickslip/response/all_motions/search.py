@@ -23,9 +23,18 @@ from stickslip.response.all_motions.basins import (
     sampler,
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
-from stickslip.response.all_motions.found import SPENT, AllMotions, Kind, Origin, Stage, gathered, work_of
+from stickslip.response.all_motions.found import (
+    SPENT,
+    AllMotions,
+    Kind,
+    MotionSearch,
+    Origin,
+    Stage,
+    gathered,
+    search_problem,
+    work_of,
+)
 from stickslip.response.all_motions.from_modes import mode_starts
-from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.continuation.branch import following_vibration, steps_through, vibration_weights
 from stickslip.response.continuation.starting_solutions import plain_sweep

@@ -11,8 +11,7 @@ from stickslip.harmonic.harmonic_set import Harmonics as Support
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
-from stickslip.study.file.own import own_object
-from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
+from stickslip.study.file.section import Positive, Section, custom_error, own_object, refuse_all, shown
 from stickslip.study.own_code import is_address, made, of_address
 
 HIGHEST = 200  # highest harmonic that a study may keep

@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
+
+from stickslip.errors import InputError
+from stickslip.study.own_code import OwnCode
 
 _NO_NAME = "/\\:*?[]<>|\"'`$"  # characters that some systems do not allow in file names
 LARGEST_NUMBER = 1e30  # in the units of the file: products of ten such numbers or inverses do not overflow
@@ -100,3 +103,27 @@ def once(values: Sequence[object], key: str) -> None:
     """Refuse a list with duplicates."""
     if len(set(values)) < len(values):
         raise custom_error(f"holds an entry twice, got {shown(list(values))}", "Give every one once.", key)
+
+
+def own_object(info: ValidationInfo, address: str, kind: str, members: Sequence[str], *, instance: bool = False) -> Any:
+    """Return the object at an address of a study file.
+
+    Parameters
+    ----------
+    info
+        Current validation; its context has the `OwnCode` of the study under ``code``.
+    address, kind, members, instance
+        As for `OwnCode.at`.
+
+    Raises
+    ------
+    PydanticCustomError
+        As `OwnCode.at`; also for an address given in Python, where the object itself is expected.
+    """
+    code: OwnCode | None = (info.context or {}).get("code")
+    if code is None:
+        raise custom_error(f"is a module path, got {shown(address)}", "In Python give the object itself.")
+    try:
+        return code.at(address, kind, members, instance=instance)
+    except InputError as error:
+        raise custom_error(error.problem, error.remedy) from None

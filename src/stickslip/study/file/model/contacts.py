@@ -22,9 +22,8 @@ from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import InputError, did_you_mean
 from stickslip.study.file.model.bodies import Triple
 from stickslip.study.file.model.parts import union_of
-from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
-from stickslip.study.file.section import Name, Positive, Section, custom_error, shown
+from stickslip.study.file.section import Name, Positive, Section, custom_error, own_object, shown
 from stickslip.study.own_code import is_address, of_address
 
 POPULATIONS: dict[str, type] = {

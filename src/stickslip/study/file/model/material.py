@@ -11,9 +11,8 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.readers.units import MODULI, SOLIDS
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
-from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import table_of
-from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
+from stickslip.study.file.section import Positive, Section, custom_error, own_object, rising_pair
 from stickslip.study.own_code import is_address
 
 FEW = 25  # default number of fixed-interface modes

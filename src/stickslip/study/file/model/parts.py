@@ -13,9 +13,8 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.study.file.model.bodies import Cylinder, FlatCurved, RigidBodyTable, Steps, Triple, Wedge, shape
 from stickslip.study.file.model.material import DampingTable, MaterialTable, ReductionTable
-from stickslip.study.file.own import own_object
 from stickslip.study.file.quantities import table_of
-from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, own_object, shown
 
 Pair = Annotated[list[Triple], Field(min_length=2, max_length=2)]
 
