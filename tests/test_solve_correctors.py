@@ -536,6 +536,13 @@ def test_a_homotopy_passes_folds_to_the_root(kind):
         assert solution.x[0] == pytest.approx(-2.1038034, abs=1e-6)
 
 
+@pytest.mark.parametrize("empty", ["legs", "begins"])
+def test_a_homotopy_with_nothing_to_follow_is_refused(empty):
+    given = {"legs": (ByDifference(loads),), "start": np.zeros(2), "begins": (0.0,)} | {empty: ()}
+    with pytest.raises(InputError, match=rf"Homotopy\.{empty}: is empty, so nothing can be followed\. Give at least"):
+        Homotopy(**given)
+
+
 def test_starts_and_homotopies_are_asked_for_one_by_one():
     asked = []
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
 from stickslip.operators import Jacobian
 from stickslip.solve.branch import ParameterEvaluation, Problem
 from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
@@ -48,6 +49,11 @@ class Homotopy:
         equation.
     max_points
         Largest number of points of one leg.
+
+    Raises
+    ------
+    InputError
+        If `legs` or `begins` is empty.
     """
 
     legs: tuple[Problem, ...]
@@ -55,6 +61,12 @@ class Homotopy:
     begins: tuple[float, ...] = (0.0,)
     least: float = 0.0
     max_points: int = 600
+
+    def __post_init__(self) -> None:
+        """Refuse a homotopy without an equation or without a beginning."""
+        for name, need in (("legs", "an equation from p = 0 to 1"), ("begins", "a parameter, such as 0.0")):
+            if not getattr(self, name):
+                raise input_error(f"Homotopy.{name}", "is empty, so nothing can be followed", f"Give at least {need}.")
 
 
 def steps_at_most(unknowns: int, share: float = 1.0) -> int:
