@@ -1,10 +1,10 @@
 """Conversion between the records of jobs and the variables of a result (`stickslip.column` describes the fields), case by case and joined."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
-from functools import cache
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
 from types import UnionType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 import xarray as xr
@@ -12,6 +12,7 @@ import xarray as xr
 from stickslip.analyses.facts import ModelFacts, facts_in
 from stickslip.arrays import FloatArray, IntArray, TextArray
 from stickslip.column import Column, Rows, columns_of, rows_of
+from stickslip.report.result import Node
 from stickslip.study.analysis import Solved
 from stickslip.study.store.netcdf import alike, one_case, stacked, variable
 from stickslip.study.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
@@ -22,6 +23,8 @@ FILLED: Mapping[str, Any] = {"f": np.nan, "i": -1, "U": ""}  # padding of record
 # missing entry of an array, by the whole annotation: the parts of an annotation depend on the version of NumPy
 ENTRIES: Mapping[Any, Any] = {FloatArray: np.nan, IntArray: -1, TextArray: "", tuple[str, ...]: "", Sequence[str]: ""}
 CASE = "case"  # dimension of cases; the record of one case lacks it
+
+R = TypeVar("R")  # class of the record of a case
 
 
 def variables(record: Any) -> dict[str, xr.Variable]:
@@ -38,9 +41,7 @@ def variables(record: Any) -> dict[str, xr.Variable]:
     return found
 
 
-def record_of(
-    kind: type[Any], case: xr.Dataset | Mapping[str, xr.Variable], sizes: Mapping[Any, int] | None = None
-) -> Any:
+def record_of(kind: type[R], case: xr.Dataset | Mapping[str, xr.Variable], sizes: Mapping[Any, int] | None = None) -> R:
     """Return the record of a case of a result, the inverse of `variables`; arrays of rows keep their padding.
 
     Parameters
@@ -235,6 +236,19 @@ def of_answers(
     found = [v for label, own in zip(labels, answers, strict=True) for v in verdicts(label, own)]
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": sum(map(lost, answers))}
     return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+@dataclass(frozen=True, eq=False)
+class CaseView(Node, Generic[R]):
+    """One case on the page, with its record; `kind` is the class of the record."""
+
+    kind: ClassVar[type[Any]]
+
+    @cached_property
+    def found(self) -> R:
+        """The record of the case."""
+        found: R = record_of(self.kind, self.data)
+        return found
 
 
 def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:

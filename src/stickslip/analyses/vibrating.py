@@ -15,13 +15,50 @@ from stickslip.assembly.part_reduction import Store
 from stickslip.column import column
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
+from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.equilibrium import pressed_by
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
 from stickslip.response.system import System
+from stickslip.units import HZ
 
 SAMPLES = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A case of an analysis of one assembled model.
+
+    Parameters
+    ----------
+    label
+        Label of the case.
+    model
+        The assembled model; amplitudes belong to its first output. Without harmonic loads, a wheel has all its waves.
+    asked
+        The table of the analysis.
+    evaluator
+        Evaluator of the contact forces.
+    facts
+        Facts about the model for the result.
+    """
+
+    label: str
+    model: Assembled
+    asked: Any
+    evaluator: Evaluator
+    facts: Mapping[str, Any]
+
+    @property
+    def dof(self) -> int:
+        """Coordinate of the first output."""
+        return coordinate(self.model.system)
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """Discretisation of the motions, a nonlinear mode's with the fewest harmonics."""
+        return represented(self.asked.harmonics, self.evaluator)
 
 
 def represented(order: int, evaluator: Evaluator) -> Discretisation:
@@ -93,6 +130,13 @@ def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[Stuc
     holds = pressed_by(model.system.springs.laws, model.static_force)
     system = model.system if wave is None else as_wave(model.system, wave)
     return stuck_modes(system, count, holds)
+
+
+def name_of_mode(label: str, wave: int, mode: StuckMode) -> str:
+    """Return the name of a mode in the log: case, wave, number, frequency and damping ratio."""
+    of = "" if wave == NO_WAVE else f"wave {wave}, "
+    case = f"{label}: " if label else ""
+    return f"{case}{of}mode {mode.number} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
 
 
 def known_coordinates(model: Assembled) -> dict[str, Any]:

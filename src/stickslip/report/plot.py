@@ -15,10 +15,13 @@ INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
 STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
 STATE_NAMES = ("stick", "slip", "open")
 STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
+STABILITY_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _NARROW = 0.5  # decades: below, 1-2-5 ticks may leave an axis without any
 _FEW_DECADES = 2.5  # up to here 1-2-5 ticks are far enough apart
 # Okabe and Ito's colours without black and yellow, then darker ones: readable on white, distinct side by side
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7b3294", "#8c564b")
+BROKEN = ("dash", "dot", "dashdot", "longdash")  # lines that a solid one is told apart from
+DASHES = ("solid", *BROKEN)
 # from navy over purple and red to dark gold, in grey as well
 _STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 156, 0))
 

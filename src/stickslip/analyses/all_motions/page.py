@@ -1,33 +1,24 @@
 """All motions on the page: every branch in one figure, and the basins of attraction."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.all_motions.records import FoundMotions, SearchedFrequency
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.report.content import Table, Words
-from stickslip.report.plot import MUTED, Plot, colour, styled
+from stickslip.report.plot import MUTED, STABILITY_SYMBOLS, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
-_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _ORIGIN = {"sweep": "the sweep", "deflation": "found by deflation", "time": "found in time"}
 
 
-@dataclass(frozen=True, eq=False)
-class Motions(Node):
+class Motions(CaseView[FoundMotions]):
     """One case."""
 
-    @cached_property
-    def found(self) -> FoundMotions:
-        """The record of the case."""
-        known: FoundMotions = record_of(FoundMotions, self.data)
-        return known
+    kind = FoundMotions
 
     @property
     def names(self) -> list[str]:
@@ -44,15 +35,13 @@ def branches(view: Motions) -> Plot:
     scale = scale_for(np.concatenate([branch.amplitude for branch in found.branches]), "m")
     for i, (name, branch) in enumerate(zip(view.names, found.branches, strict=True)):
         there = np.isfinite(branch.frequency_hz)
-        figure.add_trace(
-            go.Scatter(
-                x=branch.frequency_hz[there],
-                y=scale.factor * branch.amplitude[there],
-                mode="lines",
-                name=name,
-                line={"color": colour(i), "width": 1},
-                hovertemplate=f"{name}: %{{y:.6g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
-            )
+        figure.add_scatter(
+            x=branch.frequency_hz[there],
+            y=scale.factor * branch.amplitude[there],
+            mode="lines",
+            name=name,
+            line={"color": colour(i), "width": 1},
+            hovertemplate=f"{name}: %{{y:.6g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
         )
     _mark(found, figure, scale.factor, scale.unit)
     styled(figure, 480)
@@ -76,19 +65,17 @@ def _several(count: int, one: str, more: str) -> str:
 
 def _mark(found: FoundMotions, figure: go.Figure, factor: float, unit: str) -> None:
     """Mark the motions at the searched frequencies by their stability."""
-    for word, symbol in _SYMBOLS.items():
+    for word, symbol in STABILITY_SYMBOLS.items():
         own = [(place, motion) for place, motion in found.motions if motion.stability == word]
         if not own:
             continue
-        figure.add_trace(
-            go.Scatter(
-                x=np.array([place.hertz for place, _ in own]),
-                y=factor * np.array([motion.amplitude for _, motion in own]),
-                mode="markers",
-                name=word,
-                marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.6, "color": MUTED}},
-                hovertemplate=f"{word}: %{{y:.6g}} {unit} at %{{x:.6g}} Hz<extra></extra>",
-            )
+        figure.add_scatter(
+            x=np.array([place.hertz for place, _ in own]),
+            y=factor * np.array([motion.amplitude for _, motion in own]),
+            mode="markers",
+            name=word,
+            marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.6, "color": MUTED}},
+            hovertemplate=f"{word}: %{{y:.6g}} {unit} at %{{x:.6g}} Hz<extra></extra>",
         )
 
 

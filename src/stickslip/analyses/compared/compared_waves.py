@@ -16,13 +16,12 @@ from stickslip.analyses.waves.page.flutter import margins
 from stickslip.analyses.waves.page.waves import view_of
 from stickslip.analyses.waves.records import Flutter
 from stickslip.report.content import Table, Words
-from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.plot import DASHES, INK, Plot, styled
 from stickslip.report.quantities import NONE, scale_for
 from stickslip.report.result import Node, analysis
 from stickslip.report.section import Content
 
 View = TypeVar("View", bound=Node)
-_DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def told_by(
@@ -69,7 +68,7 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
         before = sum(own is design for own, _, _ in views[:k])
         for i, branch in enumerate(view.found.branches):
             name = ", ".join(word for word in (design.name, label, branch.name) if word)
-            dash = _DASHES[(before + i) % len(_DASHES)]
+            dash = DASHES[(before + i) % len(DASHES)]
             amplitude = branch.amplitude[branch.known]
             for panel, y in enumerate((branch.frequency_hz, 100.0 * branch.damping_ratio), 1):
                 figure.add_scatter(
@@ -111,7 +110,7 @@ def flutter(designs: Sequence[Design]) -> list[Content]:
                 y=own[order],
                 mode="lines+markers",
                 name=name,
-                line={"color": design.colour, "width": 1.4, "dash": _DASHES[(before + m) % len(_DASHES)]},
+                line={"color": design.colour, "width": 1.4, "dash": DASHES[(before + m) % len(DASHES)]},
                 hovertemplate=f"%{{y:.4g}} % at %{{x:.0f}}°<extra>{name}</extra>",
             )
     figure.add_hline(y=0.0, line={"color": INK, "width": 1})

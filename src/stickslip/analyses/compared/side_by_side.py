@@ -9,7 +9,6 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.compared.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
-from stickslip.analyses.forced_response.page.curves import DASHES
 from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
@@ -17,7 +16,7 @@ from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import Chapter, Placing, page_html
-from stickslip.report.plot import COLOURS, INK, MUTED, Plot, log_ticks, styled
+from stickslip.report.plot import BROKEN, COLOURS, DASHES, INK, MUTED, Plot, log_ticks, styled
 from stickslip.report.quantities import (
     NONE,
     Scale,
@@ -35,7 +34,6 @@ from stickslip.study.verdict import POINT_LEVELS, UNSTABLE, conclusion
 
 _BEST = "best of each"
 _CHOICE = ("selection", "high_order", "passages")  # attributes that say how harmonics were chosen
-_DASHES = ("dash", "dot", "dashdot", "longdash")
 _MOST_INPUTS = 400  # characters of a value that a cell shows
 _SYMBOLS = {"trusted": "circle", "doubtful": "circle-open", "wrong": "x", UNSTABLE: "circle-open-dot"}
 
@@ -118,7 +116,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
             y=scale.factor * curve.amplitude,
             mode="lines+markers",
             name=curve.name,
-            line={"color": INK, "width": 1.2, "dash": _DASHES[k % len(_DASHES)]},
+            line={"color": INK, "width": 1.2, "dash": BROKEN[k % len(BROKEN)]},
             marker={"size": 4, "color": INK},
             hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra>{curve.name}</extra>",
         )

@@ -13,7 +13,7 @@ from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycl
 from stickslip.analyses.limit_cycle.table import LimitCycleTable
 from stickslip.analyses.limit_cycle.time import compete, settle_cycles
 from stickslip.analyses.limit_cycle.verdicts import case_verdicts, tables
-from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates
+from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates, name_of_mode
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
@@ -50,7 +50,7 @@ def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iter
         if i < len(done):
             continue
         branch = follow_mode(question, wave, mode)
-        name = _named(question, wave, mode)
+        name = name_of_mode(question.label, wave, mode)
         LOG.info(f"{name}: {_told(branch)}")
         advance((i + 1) / len(tasks), name)
         found.append(branch)
@@ -175,12 +175,6 @@ def _linear(modes: dict[int, list[StuckMode]]) -> dict[str, object]:
         hertz[i, : len(own)] = [m.omega / HZ for m in own]
         ratio[i, : len(own)] = [m.ratio for m in own]
     return {"wave": np.array(list(modes), dtype=np.int64), "hertz": hertz, "ratio": ratio}
-
-
-def _named(question: Question, wave: int, mode: StuckMode) -> str:
-    of = "" if wave == NO_WAVE else f"wave {wave}, "
-    label = f"{question.label}: " if question.label else ""
-    return f"{label}{of}mode {mode.number} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
 
 
 def _told(branch: CycleBranch) -> str:

@@ -1,37 +1,28 @@
 """Limit cycles on the page: damping and frequency over the amplitude, stability, and the dominant wave in time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.analyses.limit_cycle.verdicts import grows
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table, Words
-from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
+from stickslip.report.plot import INK, STABILITY_SYMBOLS, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 
-_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}
 _READING = "The curve gives the damping ratio of the motion at each amplitude. Below zero the motion grows, above zero it decays. Where the curve crosses zero the motion is a limit cycle. Upward crossings attract motions of the same wave. Downward crossings repel them, and friction cannot bound the motion beyond."
 _JOINED = "Straight lines join the amplitudes computed and the limit cycles between them. Limit cycles have as many harmonics as they need."
 
 
-@dataclass(frozen=True, eq=False)
-class Cycles(Node):
+class Cycles(CaseView[LimitCycles]):
     """One case."""
 
-    @cached_property
-    def found(self) -> LimitCycles:
-        """The record of the case."""
-        known: LimitCycles = record_of(LimitCycles, self.data)
-        return known
+    kind = LimitCycles
 
 
 def _with_cycles(branch: CycleBranch, motions: FloatArray, at_cycles: Sequence[float]) -> tuple[FloatArray, FloatArray]:
@@ -91,15 +82,13 @@ def waves_in_time(view: Cycles) -> Plot | None:
     largest = amplitude.max(axis=0)
     shown = [k for k in range(amplitude.shape[1]) if largest[k] > 1e-3 * largest.max()]
     for i, k in enumerate(shown):
-        figure.add_trace(
-            go.Scatter(
-                x=time,
-                y=scale.factor * amplitude[:, k],
-                mode="lines",
-                name=f"wave {k}",
-                line={"color": colour(i), "width": 1.8},
-                hovertemplate=f"wave {k}: %{{y:.4g}} {scale.unit} at %{{x:.4g}} s<extra></extra>",
-            )
+        figure.add_scatter(
+            x=time,
+            y=scale.factor * amplitude[:, k],
+            mode="lines",
+            name=f"wave {k}",
+            line={"color": colour(i), "width": 1.8},
+            hovertemplate=f"wave {k}: %{{y:.4g}} {scale.unit} at %{{x:.4g}} s<extra></extra>",
         )
     styled(figure, 420)
     figure.update_xaxes(title_text="time (s)")
@@ -158,15 +147,13 @@ def _over_amplitude(found: LimitCycles, own: Sequence[tuple[FloatArray, Sequence
     scale = scale_for(np.array([np.nanmedian(every)]), "m")
     for i, (branch, (motions, at_cycles)) in enumerate(zip(found.branches, own, strict=True)):
         amplitude, values = _with_cycles(branch, motions, at_cycles)
-        figure.add_trace(
-            go.Scatter(
-                x=scale.factor * amplitude,
-                y=values,
-                mode="lines",
-                name=branch.name,
-                line={"color": colour(i), "width": 2},
-                hovertemplate=f"{branch.name}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
-            )
+        figure.add_scatter(
+            x=scale.factor * amplitude,
+            y=values,
+            mode="lines",
+            name=branch.name,
+            line={"color": colour(i), "width": 2},
+            hovertemplate=f"{branch.name}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
         )
     styled(figure, 460)
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
@@ -181,20 +168,18 @@ def _mark(found: LimitCycles, figure: go.Figure, heights: Sequence[float]) -> No
     factor, unit = figure.layout.meta["factor"], figure.layout.meta["unit"]
     of_branch = [i for i, branch in enumerate(found.branches) for _ in branch.cycles]
     every = [(cycle, i, height) for (_, cycle), i, height in zip(found.cycles, of_branch, heights, strict=True)]
-    for word, symbol in _SYMBOLS.items():
+    for word, symbol in STABILITY_SYMBOLS.items():
         own = [(c, i, height) for c, i, height in every if c.stability == word]
         if not own:
             continue
         lines = [colour(i) for _, i, _ in own]
-        figure.add_trace(
-            go.Scatter(
-                x=factor * np.array([c.amplitude for c, _, _ in own]),
-                y=np.array([height for _, _, height in own]),
-                mode="markers",
-                name=word,
-                marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
-                hovertemplate=f"{word} limit cycle: %{{x:.5g}} {unit}<extra></extra>",
-            )
+        figure.add_scatter(
+            x=factor * np.array([c.amplitude for c, _, _ in own]),
+            y=np.array([height for _, _, height in own]),
+            mode="markers",
+            name=word,
+            marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
+            hovertemplate=f"{word} limit cycle: %{{x:.5g}} {unit}<extra></extra>",
         )
 
 
@@ -202,7 +187,7 @@ def _caption(found: LimitCycles) -> str:
     parts = [_READING]
     if found.cycles:
         words = [cycle.stability for _, cycle in found.cycles]
-        counts = [counted(words.count(word), f"{word} limit cycle") for word in _SYMBOLS if word in words]
+        counts = [counted(words.count(word), f"{word} limit cycle") for word in STABILITY_SYMBOLS if word in words]
         parts.append(f"There are {joined(counts)} (marked).")
     bounded = [
         f"{b.name} {number(100 * b.largest_damping_ratio)} %"

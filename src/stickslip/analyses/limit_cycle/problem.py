@@ -1,9 +1,9 @@
 """The problem of a job: model, waves, modes, and the choice of unstable ones."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+from stickslip.analyses import vibrating
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.limit_cycle.table import MODES, LimitCycleTable
 from stickslip.analyses.vibrating import (
@@ -11,16 +11,12 @@ from stickslip.analyses.vibrating import (
     modes_of,
     refuse_rigid,
     refuse_waves,
-    represented,
     require_flow,
 )
-from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.reduction.waves import NO_WAVE
-from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analysis import Case
 from stickslip.units import RPM
@@ -29,31 +25,17 @@ IN_TIME = "verify"
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """A case of the analysis.
+class Question(vibrating.Question):
+    """A case of the analysis, whose model has no harmonic loads.
 
     Parameters
     ----------
-    label
-        Label of the case.
-    model
-        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes belong to the first output.
-    asked
-        The table [limit_cycle].
-    evaluator
-        Evaluator of the contact forces.
     in_time
         Whether limit cycles are compared with time integration.
-    facts
-        Facts about the model for the result.
     """
 
-    label: str
-    model: Assembled
     asked: LimitCycleTable
-    evaluator: Evaluator
     in_time: bool
-    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def waves(self) -> tuple[int, ...]:
@@ -78,11 +60,6 @@ class Question:
         named = self.asked.wave_numbers is not None and not any(m.unstable for m in modes)
         return modes[:1] if named else [m for m in modes if m.unstable]
 
-    @property
-    def discretisation(self) -> Discretisation:
-        """Discretisation of the curve over amplitude."""
-        return represented(self.asked.harmonics, self.evaluator)
-
 
 def question_of(case: Case, model: Model) -> Question:
     """Return the problem of a job.
@@ -98,14 +75,9 @@ def question_of(case: Case, model: Model) -> Question:
     refuse_whole("limit_cycle", model)
     assembled = free_to_vibrate(model, most, case.store)
     refuse_rigid("limit_cycle", assembled)
-    question = Question(
-        case.label,
-        assembled,
-        asked,
-        case.settings.solver.evaluator,
-        asked.in_time or IN_TIME in case.checks,
-        facts_of(model, model.speed / RPM),
-    )
+    in_time = asked.in_time or IN_TIME in case.checks
+    facts = facts_of(model, model.speed / RPM)
+    question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts, in_time)
     force = assembled.system.structure.feedback_of(1)
     if asked.modes is None and (force is None or not force.influence.refuses):
         return question

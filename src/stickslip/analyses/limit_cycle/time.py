@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import MOST_IN_TIME
+from stickslip.analyses.forced_response.stability.in_time import KICK, disturbed
 from stickslip.analyses.limit_cycle.problem import Question
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch
 from stickslip.analyses.vibrating import as_wave, coordinate
@@ -26,9 +26,7 @@ from stickslip.units import HZ, millimetres
 
 STEPS = 512
 FEW_STEPS = 256  # time steps of a period in the competition of waves, which takes hundreds of periods
-KICK = 1e-3  # disturbance of velocities relative to their amplitude
 SETTLED = 1e-7
-GOLDEN = 2.399963  # golden angle, rad: the disturbances of all coordinates differ
 SHARE = 0.3  # initial amplitude of a competing wave, as a share of its attracting cycle
 
 
@@ -161,5 +159,4 @@ def _motion(question: Question, branch: CycleBranch, cycle: Cycle) -> ComplexArr
 def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:
     """Return a start whose velocities are disturbed, differently in each coordinate."""
     size = sum(omega * np.abs(motion) for motion, omega in motions)
-    shares = np.cos(GOLDEN * np.arange(start.velocity.size))
-    return replace(start, velocity=start.velocity + KICK * shares * size)
+    return disturbed(start, np.asarray(size), KICK)

@@ -1,19 +1,15 @@
 """Synthesised responses over the backbone, peaks over the level, passages, and verdicts."""
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.analyses.modal_synthesis.verdicts import percent
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 
@@ -22,15 +18,10 @@ NOTHING = np.zeros(0)
 MAX_NAMED_CURVES = 24  # largest number of curves with names
 
 
-@dataclass(frozen=True, eq=False)
-class Synthesised(Node):
+class Synthesised(CaseView[ModalSynthesis]):
     """One case."""
 
-    @cached_property
-    def found(self) -> ModalSynthesis:
-        """The record of the case."""
-        known: ModalSynthesis = record_of(ModalSynthesis, self.data)
-        return known
+    kind = ModalSynthesis
 
     @property
     def levels(self) -> FloatArray:

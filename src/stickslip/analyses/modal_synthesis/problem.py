@@ -1,33 +1,27 @@
 """The problem of a job: the model with its loads, and the mode."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from stickslip.analyses import vibrating
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.problem import peak_first
 from stickslip.analyses.modal_synthesis.table import ModalSynthesisTable
 from stickslip.analyses.nonlinear_mode.problem import sweep_of
 from stickslip.analyses.vibrating import (
-    coordinate,
     modes_of,
     no_such_mode,
     refuse_rigid,
-    represented,
     require_flow,
 )
-from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
-from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analysis import Case
 from stickslip.units import RPM
@@ -36,34 +30,10 @@ NAME = "modal_synthesis"
 MOST_FORCE = 1e60  # N, above which the polynomial of the response overflows
 
 
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A case of the analysis.
+class Question(vibrating.Question):
+    """A case of the analysis."""
 
-    Parameters
-    ----------
-    label
-        Label of the case.
-    model
-        The assembled model; amplitudes belong to its first output.
-    asked
-        The table [modal_synthesis].
-    evaluator
-        Evaluator of the contact forces.
-    facts
-        Facts about the model for the result.
-    """
-
-    label: str
-    model: Assembled
     asked: ModalSynthesisTable
-    evaluator: Evaluator
-    facts: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def dof(self) -> int:
-        """Coordinate of the first output."""
-        return coordinate(self.model.system)
 
     @property
     def rest(self) -> HarmonicLoad:
@@ -75,11 +45,6 @@ class Question:
         """The mode of the synthesis; None if it does not exist."""
         every = modes_of(self.model, self.asked.mode)
         return next((m for m in every if m.number == self.asked.mode), None)
-
-    @property
-    def discretisation(self) -> Discretisation:
-        """Discretisation of the nonlinear mode with the fewest harmonics."""
-        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:

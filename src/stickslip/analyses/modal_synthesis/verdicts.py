@@ -153,7 +153,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return the terminal tables: the levels of each case."""
     found = []
     for one, head in told_apart(data):
-        case: ModalSynthesis = record_of(ModalSynthesis, one)
+        case = record_of(ModalSynthesis, one)
         if case.levels:
             found.append(_table(case, head))
             found += _passages(case, head)

@@ -10,7 +10,7 @@ from stickslip.analyses.nonlinear_mode.problem import NAME, Question, question_o
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes, answer, mode_record
 from stickslip.analyses.nonlinear_mode.table import NonlinearModeTable
 from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts, tables
-from stickslip.analyses.vibrating import as_wave, known_coordinates
+from stickslip.analyses.vibrating import as_wave, known_coordinates, name_of_mode
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
@@ -31,7 +31,7 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
         before = [r for r in done if (r.wave_number, r.mode) == (wave, mode.number)]
         if before and before[-1].kind == END:
             continue
-        name = _named(question, wave, mode)
+        name = name_of_mode(question.label, wave, mode)
         for record in follow_mode(question, wave, mode, before):
             if record.kind == END:
                 LOG.info(f"{name}: {record.problem or record.end}")
@@ -72,12 +72,6 @@ def follow_mode(question: Question, wave: int, mode: StuckMode, done: Sequence[M
         resonant=resonant,
         other_ratio=other,
     )
-
-
-def _named(question: Question, wave: int, mode: StuckMode) -> str:
-    of = "" if wave == NO_WAVE else f"wave {wave}, "
-    label = f"{question.label}: " if question.label else ""
-    return f"{label}{of}mode {mode.number} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
 
 
 def _lost(found: NonlinearModes) -> int:

@@ -1,13 +1,11 @@
 """Nonlinear modes: frequency and damping ratio over the amplitude and the energy, and backbones over frequency responses."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
@@ -24,15 +22,10 @@ _READING = "A free motion of each amplitude decays with this damping ratio, whic
 _ENERGY = "The energy is twice the mean kinetic energy of all harmonics, per sector on a wheel. With linear springs it is the total energy."
 
 
-@dataclass(frozen=True, eq=False)
-class Modes(Node):
+class Modes(CaseView[NonlinearModes]):
     """One case."""
 
-    @cached_property
-    def found(self) -> NonlinearModes:
-        """The record of the case."""
-        known: NonlinearModes = record_of(NonlinearModes, self.data)
-        return known
+    kind = NonlinearModes
 
 
 def frequencies(view: Modes) -> Plot | None:

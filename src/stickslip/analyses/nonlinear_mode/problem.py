@@ -1,29 +1,24 @@
 """The problem of a job: the model at rest, its waves, and the modes to follow."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
+from stickslip.analyses import vibrating
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.modal_synthesis.table import ModalSynthesisTable
 from stickslip.analyses.nonlinear_mode.table import NonlinearModeTable
 from stickslip.analyses.vibrating import (
-    coordinate,
     free_to_vibrate,
     modes_of,
     no_such_mode,
     refuse_rigid,
     refuse_waves,
-    represented,
     require_flow,
 )
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.compiled import Evaluator
 from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
-from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analysis import Case
 from stickslip.units import RPM
@@ -32,46 +27,22 @@ NAME = "nonlinear_mode"
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """A case of the analysis.
+class Question(vibrating.Question):
+    """A case of the analysis, whose model has no harmonic loads.
 
     Parameters
     ----------
-    label
-        Label of the case.
-    model
-        The assembled model without harmonic loads; a wheel has all its waves. Amplitudes belong to the first output.
-    asked
-        The table [nonlinear_mode].
     waves
         Wave numbers to examine; only `NO_WAVE` for a single structure.
-    evaluator
-        Evaluator of the contact forces.
-    facts
-        Facts about the model for the result.
     """
 
-    label: str
-    model: Assembled
     asked: NonlinearModeTable
     waves: tuple[int, ...]
-    evaluator: Evaluator
-    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def followed(self, wave: int) -> list[StuckMode]:
         """Return the modes of a wave to follow."""
         every = modes_of(self.model, max(self.asked.modes), wave)
         return [m for m in every if m.number in self.asked.modes]
-
-    @property
-    def dof(self) -> int:
-        """Coordinate of the first output."""
-        return coordinate(self.model.system)
-
-    @property
-    def discretisation(self) -> Discretisation:
-        """Discretisation with the fewest harmonics."""
-        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:
@@ -106,14 +77,8 @@ def question_of(case: Case, model: Model) -> Question:
     refuse_whole(NAME, model)
     assembled = free_to_vibrate(model, most, case.store)
     refuse_rigid(NAME, assembled)
-    question = Question(
-        case.label,
-        assembled,
-        asked,
-        _waves(asked, model, assembled),
-        case.settings.solver.evaluator,
-        facts_of(model, model.speed / RPM),
-    )
+    facts, waves = facts_of(model, model.speed / RPM), _waves(asked, model, assembled)
+    question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts, waves)
     question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     modes = [mode for wave in question.waves for mode in _required(question, wave)]
     require_flow(assembled, modes, most, "a nonlinear mode")

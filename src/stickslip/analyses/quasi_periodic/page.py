@@ -1,19 +1,16 @@
 """Motions with two frequencies on the page: envelopes, and their combined frequencies."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 from stickslip.units import HZ
 
@@ -21,15 +18,10 @@ SHOWN = 6  # motions drawn one by one
 FAINT = 1e-4  # share of the largest amplitude, below which combined frequencies are not drawn
 
 
-@dataclass(frozen=True, eq=False)
-class TwoTonesView(Node):
+class TwoTonesView(CaseView[QuasiPeriodic]):
     """One case."""
 
-    @cached_property
-    def found(self) -> QuasiPeriodic:
-        """The record of the case."""
-        known: QuasiPeriodic = record_of(QuasiPeriodic, self.data)
-        return known
+    kind = QuasiPeriodic
 
     @property
     def name(self) -> str:
@@ -69,15 +61,13 @@ def envelopes(view: TwoTonesView) -> Plot | None:
     sizes = {w: np.array([getattr(point, w)[0] for point in points]) for w in ("largest", "least", "rms")}
     scale = scale_for(sizes["largest"][np.isfinite(sizes["largest"])], "m")
     for i, (word, own) in enumerate(sizes.items()):
-        figure.add_trace(
-            go.Scatter(
-                x=hz,
-                y=scale.factor * own,
-                mode="lines+markers",
-                name={"rms": "root mean square"}.get(word, f"{word} amplitude"),
-                line={"color": colour(i), "width": 2},
-                hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra>{word}</extra>",
-            )
+        figure.add_scatter(
+            x=hz,
+            y=scale.factor * own,
+            mode="lines+markers",
+            name={"rms": "root mean square"}.get(word, f"{word} amplitude"),
+            line={"color": colour(i), "width": 2},
+            hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra>{word}</extra>",
         )
     styled(figure, 440)
     figure.update_xaxes(title_text="first frequency (Hz)")
@@ -94,15 +84,13 @@ def over_phase(view: TwoTonesView) -> Plot | None:
     scale = scale_for(_known([point.envelope for point in view.found.points]), "m")
     for i, point in enumerate(view.drawn):
         phases = point.envelope.size
-        figure.add_trace(
-            go.Scatter(
-                x=360.0 * np.arange(phases) / phases,
-                y=scale.factor * point.envelope,
-                mode="lines",
-                name=_label(point),
-                line={"color": colour(i), "width": 2},
-                hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.0f}}°<extra>{_label(point)}</extra>",
-            )
+        figure.add_scatter(
+            x=360.0 * np.arange(phases) / phases,
+            y=scale.factor * point.envelope,
+            mode="lines",
+            name=_label(point),
+            line={"color": colour(i), "width": 2},
+            hovertemplate=f"%{{y:.5g}} {scale.unit} at %{{x:.0f}}°<extra>{_label(point)}</extra>",
         )
     styled(figure, 420)
     figure.update_xaxes(title_text="phase of the second frequency where a period begins (degrees)")
@@ -122,16 +110,14 @@ def combined(view: TwoTonesView) -> Plot | None:
         known = np.isfinite(sizes) & (sizes > FAINT * np.nanmax(sizes[1:]))
         known[0] = False
         names = [f"{j} f1 {k:+d} f2" for j, k in point.indices[known]]
-        figure.add_trace(
-            go.Scatter(
-                x=np.abs(hz[known]),
-                y=scale.factor * sizes[known],
-                mode="markers",
-                name=_label(point),
-                text=names,
-                marker={"color": colour(i), "size": 8},
-                hovertemplate=f"%{{text}}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
-            )
+        figure.add_scatter(
+            x=np.abs(hz[known]),
+            y=scale.factor * sizes[known],
+            mode="markers",
+            name=_label(point),
+            text=names,
+            marker={"color": colour(i), "size": 8},
+            hovertemplate=f"%{{text}}: %{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra></extra>",
         )
     styled(figure, 420)
     figure.update_xaxes(title_text="frequency (Hz)")

@@ -1,18 +1,14 @@
 """Residual tractions: bounds of the amplitude over frequency, and of the resonance."""
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.residual_tractions.records import ConfirmedEnd, ResidualTractions
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _NAMES = ("own start", "smallest", "largest")
@@ -25,15 +21,10 @@ def has_width(least: FloatArray, most: FloatArray) -> bool:
     return bool(np.any(most[known] - least[known] > _EQUAL * np.abs(least[known])))
 
 
-@dataclass(frozen=True, eq=False)
-class Tractions(Node):
+class Tractions(CaseView[ResidualTractions]):
     """One case."""
 
-    @cached_property
-    def found(self) -> ResidualTractions:
-        """The record of the case."""
-        known: ResidualTractions = record_of(ResidualTractions, self.data)
-        return known
+    kind = ResidualTractions
 
     @property
     def least(self) -> FloatArray:

@@ -1,27 +1,22 @@
 """The problem of a job: the model and its bounds over residual tractions."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stickslip.analyses import vibrating
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.estimate import Estimate, estimate
 from stickslip.analyses.forced_response.problem import peak_first
 from stickslip.analyses.residual_tractions.table import ResidualTractionsTable
-from stickslip.analyses.vibrating import represented
 from stickslip.arrays import FloatArray
-from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
-from stickslip.contact.compiled import Evaluator
 from stickslip.contact.initial_sliders import starts_of
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.search import TractionSearch
 from stickslip.study.analysis import Case
 from stickslip.study.models.cost import above
@@ -32,42 +27,23 @@ STEPS = 0.5  # Newton steps of such a motion over the steps of a point of a resp
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """A case of the analysis.
+class Question(vibrating.Question):
+    """A case of the analysis; the first output is bounded.
 
     Parameters
     ----------
-    label
-        Label of the case.
-    model
-        The assembled model; the first output is bounded.
-    asked
-        The table [residual_tractions].
-    evaluator
-        Evaluator of the contact forces.
     excitation
         Amplitude of the harmonic force, N; NaN for none.
-    facts
-        Facts about the model for the result.
     """
 
-    label: str
-    model: Assembled
     asked: ResidualTractionsTable
-    evaluator: Evaluator
     excitation: float
-    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def omegas(self) -> FloatArray:
         """Frequencies of the bounds, rad/s."""
         first, last = self.asked.frequency_hz
         return np.asarray(HZ * np.linspace(first, last, self.asked.points))
-
-    @property
-    def discretisation(self) -> Discretisation:
-        """Discretisation of the motions."""
-        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def search(self) -> TractionSearch:
@@ -130,11 +106,5 @@ def question_of(case: Case, model: Model) -> Question:
         starts_of(assembled.system.interface)
     except InputError as error:
         raise error.at(f"residual_tractions: {error.place}") from None
-    return Question(
-        case.label,
-        assembled,
-        asked,
-        case.settings.solver.evaluator,
-        float(assembled.excitation),
-        facts_of(model, model.speed / RPM),
-    )
+    facts, excitation = facts_of(model, model.speed / RPM), float(assembled.excitation)
+    return Question(case.label, assembled, asked, case.settings.solver.evaluator, facts, excitation)

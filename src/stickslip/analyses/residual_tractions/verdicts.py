@@ -133,7 +133,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     labels = [str(x) for x in data["case_label"].values]
     rows = []
     for i, label in enumerate(labels):
-        found: ResidualTractions = record_of(ResidualTractions, one_case(data, i))
+        found = record_of(ResidualTractions, one_case(data, i))
         if not found.resonances:
             continue
         each = [text for top in found.resonances for text in (f"{1e3 * top.amplitude:.5g}", f"{top.frequency_hz:.3f}")]

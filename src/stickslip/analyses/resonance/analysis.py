@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import of_answers
-from stickslip.analyses.resonance.envelope import heights, valley
 from stickslip.analyses.resonance.problem import Question, more_than, question_of
 from stickslip.analyses.resonance.records import Resonances, answer
 from stickslip.analyses.resonance.table import ResonanceTable
@@ -16,6 +15,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.response.resonances.curve import peak_curve
+from stickslip.response.resonances.envelope import heights, valley
 from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, represented_as, smallest_peak

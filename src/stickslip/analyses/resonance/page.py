@@ -1,19 +1,16 @@
 """Resonance peaks over a design parameter: amplitude, frequency, phase, energy."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
 _BY = {
@@ -23,15 +20,10 @@ _BY = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Peaks(Node):
+class Peaks(CaseView[Resonances]):
     """One case."""
 
-    @cached_property
-    def found(self) -> Resonances:
-        """The record of the case."""
-        known: Resonances = record_of(Resonances, self.data)
-        return known
+    kind = Resonances
 
     @property
     def amplitude(self) -> FloatArray:
@@ -86,15 +78,13 @@ def energies(view: Peaks) -> Plot:
     scale = scale_for(np.concatenate([peak.energy for peak in peaks]), "J")
     figure = _over_parameter(view.found, [scale.factor * peak.energy for peak in peaks], scale.unit)
     for i, peak in enumerate(peaks):
-        figure.add_trace(
-            go.Scatter(
-                x=peak.value[peak.known],
-                y=scale.factor * peak.friction_energy[peak.known],
-                mode="lines",
-                name=f"peak {i + 1}, contacts",
-                line={"color": colour(i), "width": 1.4, "dash": "dot"},
-                hovertemplate=f"contacts take %{{y:.4g}} {scale.unit} at %{{x:.5g}}<extra></extra>",
-            )
+        figure.add_scatter(
+            x=peak.value[peak.known],
+            y=scale.factor * peak.friction_energy[peak.known],
+            mode="lines",
+            name=f"peak {i + 1}, contacts",
+            line={"color": colour(i), "width": 1.4, "dash": "dot"},
+            hovertemplate=f"contacts take %{{y:.4g}} {scale.unit} at %{{x:.5g}}<extra></extra>",
         )
     figure.update_yaxes(title_text=f"energy of a period ({scale.unit})", rangemode="tozero")
     caption = "Solid lines show the work of the loads in a period of the first harmonic, which equals the dissipation. Dotted lines show the contacts' share."
@@ -134,16 +124,14 @@ def _over_parameter(found: Resonances, each: Sequence[FloatArray], unit: str) ->
             shown = np.where((kind == 0) == low, own[peak.known], np.nan)
             if low and not np.any(np.isfinite(shown)):
                 continue
-            figure.add_trace(
-                go.Scatter(
-                    x=value,
-                    y=shown,
-                    mode="lines+markers",
-                    name=f"peak {i + 1}{', no maximum' * low}",
-                    line={"color": colour(i), "width": 2, "dash": "dash" if low else "solid"},
-                    marker={"size": 5},
-                    hovertemplate=f"peak {i + 1}: %{{y:.6g}} {unit} at %{{x:.6g}}<extra></extra>",
-                )
+            figure.add_scatter(
+                x=value,
+                y=shown,
+                mode="lines+markers",
+                name=f"peak {i + 1}{', no maximum' * low}",
+                line={"color": colour(i), "width": 2, "dash": "dash" if low else "solid"},
+                marker={"size": 5},
+                hovertemplate=f"peak {i + 1}: %{{y:.6g}} {unit} at %{{x:.6g}}<extra></extra>",
             )
     styled(figure, 440)
     figure.update_xaxes(title_text=found.parameter)
@@ -151,15 +139,13 @@ def _over_parameter(found: Resonances, each: Sequence[FloatArray], unit: str) ->
 
 
 def _mark(figure: go.Figure, x: FloatArray, y: FloatArray, name: str, shade: str) -> None:
-    figure.add_trace(
-        go.Scatter(
-            x=x,
-            y=y,
-            mode="markers",
-            name=name,
-            marker=ring(shade, 13, 2),
-            hovertemplate=f"{name}: %{{y:.6g}} at %{{x:.6g}}<extra></extra>",
-        )
+    figure.add_scatter(
+        x=x,
+        y=y,
+        mode="markers",
+        name=name,
+        marker=ring(shade, 13, 2),
+        hovertemplate=f"{name}: %{{y:.6g}} at %{{x:.6g}}<extra></extra>",
     )
 
 

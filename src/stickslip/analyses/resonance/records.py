@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.resonance.envelope import Overtaking, along_span, heights, overtakings
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.column import column, rows
+from stickslip.response.resonances.envelope import Overtaking, along_span, heights, overtakings
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.study.analysis import Solved
 from stickslip.units import DEG, HZ

@@ -1,35 +1,26 @@
 """The run-up: a Campbell diagram with the response on it, amplitudes over speed, static forces."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.analyses.columns import record_of
+from stickslip.analyses.columns import CaseView
 from stickslip.analyses.run_up.records import LinePoint, RunUp
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.plot import INK, MUTED, Plot, colour, styled
+from stickslip.report.plot import BROKEN, INK, MUTED, Plot, colour, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
-from stickslip.report.result import Node
 from stickslip.report.section import Block, Card, Section
 
-_DASHES = ("dash", "dot", "dashdot", "longdash")
 _LARGEST, _SMALLEST = 26.0, 3.0  # sizes of markers for the largest and for zero amplitude
 _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"]]
 
 
-@dataclass(frozen=True, eq=False)
-class RunUpView(Node):
+class RunUpView(CaseView[RunUp]):
     """One case of a run-up."""
 
-    @cached_property
-    def found(self) -> RunUp:
-        """The record of the case."""
-        known: RunUp = record_of(RunUp, self.data)
-        return known
+    kind = RunUp
 
     def amplitude(self, points: Sequence[LinePoint]) -> FloatArray:
         """Return (points,) amplitudes of the output whose peak is resolved."""
@@ -174,7 +165,7 @@ def fast(view: RunUpView) -> Plot | None:
                 y=scale.factor * swept.amplitude,
                 mode="lines",
                 name=name,
-                line={"color": colour(i), "width": 1.2, "dash": _DASHES[j % len(_DASHES)]},
+                line={"color": colour(i), "width": 1.2, "dash": BROKEN[j % len(BROKEN)]},
                 hovertemplate=f"{name}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
             )
     styled(figure, 480)

@@ -114,7 +114,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return the terminal tables."""
     told = []
     for k, label in enumerate(data["case_label"].values):
-        found: RunUp = record_of(RunUp, one_case(data, k))
+        found = record_of(RunUp, one_case(data, k))
         head = f"{label}: " if label and data.sizes["case"] > 1 else ""
         if found.lines:
             told.append(_peaks(found, head))

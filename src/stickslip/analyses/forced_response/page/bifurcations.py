@@ -81,17 +81,15 @@ def _branches(figure: go.Figure, response: Response, case: ShownCase, over: floa
     every = np.unique(found.side_point_branch)
     for branch in every:
         own = found.side_point_branch == branch
-        figure.add_trace(
-            go.Scatter(
-                x=found.side_point_frequency_hz[own] * over,
-                y=found.side_point_amplitude[own] / _divisor(response, case) * response.scale.factor,
-                mode="lines",
-                name="leaves the response",
-                legendgroup="bifurcations",
-                showlegend=False,
-                line={"color": case.colour, "width": 1.4, "dash": "dot"},
-                hovertemplate="%{x:.2f}: %{y:.4g}<br>a branch that leaves the response<extra></extra>",
-            )
+        figure.add_scatter(
+            x=found.side_point_frequency_hz[own] * over,
+            y=found.side_point_amplitude[own] / _divisor(response, case) * response.scale.factor,
+            mode="lines",
+            name="leaves the response",
+            legendgroup="bifurcations",
+            showlegend=False,
+            line={"color": case.colour, "width": 1.4, "dash": "dot"},
+            hovertemplate="%{x:.2f}: %{y:.4g}<br>a branch that leaves the response<extra></extra>",
         )
     return int(every.size)
 

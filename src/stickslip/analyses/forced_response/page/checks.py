@@ -100,16 +100,14 @@ def amplitudes_in_time(response: Response) -> Plot | None:
     for i, (case, march) in enumerate(response.rows(MotionsInTime)):
         own, told = march.not_periodic_amplitudes, f"{march.not_periodic_frequency_hz:.2f} Hz"
         name = f"{case.short}, {told}" if case.short else told
-        figure.add_trace(
-            go.Scatter(
-                x=np.arange(own.size),
-                y=scale.factor * own,
-                mode="lines+markers",
-                name=name,
-                line={"color": colour(i), "width": 1.4},
-                marker={"size": 4},
-                hovertemplate=f"%{{y:.4g}} {scale.unit}<extra>{name}</extra>",
-            )
+        figure.add_scatter(
+            x=np.arange(own.size),
+            y=scale.factor * own,
+            mode="lines+markers",
+            name=name,
+            line={"color": colour(i), "width": 1.4},
+            marker={"size": 4},
+            hovertemplate=f"%{{y:.4g}} {scale.unit}<extra>{name}</extra>",
         )
     styled(figure, 380)
     figure.update_xaxes(title_text="period")

@@ -16,7 +16,7 @@ from stickslip.analyses.forced_response.summary import amplitude_name, orders_se
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import CASE, ShownCase
-from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
+from stickslip.report.plot import ALARM, DASHES, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.verdict import POINT_LEVELS
 
@@ -328,9 +328,6 @@ def frequency_response(response: Response) -> Plot | None:
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", col=1 if len(shown) > 1 else None)
     title = "Frequency response of all cases" if len(response.cases) > 1 else "Frequency response"
     return Plot("response", title, _caption(response) + located(response) + told, figure)
-
-
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 
 def of_each_order(response: Response) -> Plot | None:

@@ -393,7 +393,7 @@ def integrated(
         point.omega,
         system.outputs,
         start=begin
-        or _kicked(
+        or disturbed(
             start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws),
             kick * _speeds(motion, point.omega),
         ),
@@ -413,9 +413,9 @@ def _speeds(motion: ComplexArray, omega: float) -> FloatArray:
     return np.asarray(np.sum(np.abs(orders * omega * motion), axis=0))
 
 
-def _kicked(start: TransientStart, speeds: FloatArray) -> TransientStart:
-    """Return an initial state with velocities changed by up to `speeds`, differently in each coordinate, so that no symmetry hides a disturbance."""
-    shares = np.cos(GOLDEN * np.arange(speeds.size))
+def disturbed(start: TransientStart, speeds: FloatArray, kick: float = 1.0) -> TransientStart:
+    """Return an initial state with velocities changed by up to `kick` times `speeds`, differently in each coordinate, so that no symmetry hides a disturbance."""
+    shares = kick * np.cos(GOLDEN * np.arange(speeds.size))
     return replace(start, velocity=start.velocity + shares * speeds)
 
 

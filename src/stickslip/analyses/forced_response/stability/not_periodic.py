@@ -1,7 +1,7 @@
 """Time integration at points without a periodic motion, or without a stable one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -10,13 +10,13 @@ import numpy as np
 from stickslip.analyses.forced_response.problem import Question, too_large
 from stickslip.analyses.forced_response.records.columns import MotionsInTime, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
-from stickslip.analyses.forced_response.stability.in_time import GOLDEN, KICK
+from stickslip.analyses.forced_response.stability.in_time import KICK, disturbed
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
 from stickslip.response.quasi_periodic.in_time import KEPT, MAX_PERIODS, MIN_PERIODS, PEAKS, Course, course, statistics
 from stickslip.response.time.sectors import all_sectors
-from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
+from stickslip.response.time.start import rest, start_from_harmonics
 from stickslip.units import HZ, millimetres, millimetres_between
 
 STEPS = 512  # least number in a period
@@ -165,7 +165,7 @@ def _marched(question: Question, response: Response, omega: float, work: float, 
     start = rest(structure.n, contacts.laws)
     if motion is not None:
         start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
-        start = _disturbed(start, omega * np.abs(motion[1:]).sum(axis=0))
+        start = disturbed(start, omega * np.abs(motion[1:]).sum(axis=0), KICK)
     needed = _needed(multiplier)
     least = MIN_PERIODS if np.isinf(needed) else int(np.clip(needed, MIN_PERIODS, MOST_PERIODS))
     march = partial(course, structure, contacts, load, omega, system.outputs)
@@ -196,11 +196,6 @@ def _away(found: Course, motion: ComplexArray) -> float:
     last = found.samples[-1] - found.samples[-1].mean(axis=0)
     size = float(np.linalg.norm(own))
     return float(np.linalg.norm(last - own)) / size if size > 0.0 else np.nan
-
-
-def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
-    shares = KICK * np.cos(GOLDEN * np.arange(speeds.size))
-    return replace(start, velocity=start.velocity + shares * speeds)
 
 
 def _told(question: Question, response: Response, omega: float, why: str, march: _March) -> Answer:

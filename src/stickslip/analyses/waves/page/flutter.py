@@ -24,15 +24,13 @@ def least_stable_diagram(view: Waves[Flutter]) -> Plot:
     for m in range(energy.shape[1]):
         mode, line = f"mode {m + 1}", {"color": colour(m), "width": 1.4}
         said = "%{text}: %{y:.4g} %<extra></extra>"
-        figure.add_trace(
-            go.Scatter(
-                x=found.curve_angle_deg,
-                y=_PERCENT * found.curve_damping[m],
-                mode="lines",
-                line=line,
-                name=f"{mode}, any phase angle",
-                hovertemplate="%{x:.0f}°: %{y:.4g} %<extra></extra>",
-            )
+        figure.add_scatter(
+            x=found.curve_angle_deg,
+            y=_PERCENT * found.curve_damping[m],
+            mode="lines",
+            line=line,
+            name=f"{mode}, any phase angle",
+            hovertemplate="%{x:.0f}°: %{y:.4g} %<extra></extra>",
         )
         for values, how, mark in (
             (energy[:, m], "energy method", {"size": 8, "color": colour(m)}),
@@ -44,16 +42,14 @@ def least_stable_diagram(view: Waves[Flutter]) -> Plot:
             ),
         ):
             texts = [f"{mode}, {name}, {how}" for name in names]
-            figure.add_trace(
-                go.Scatter(
-                    x=angle,
-                    y=values,
-                    mode="markers",
-                    marker=mark,
-                    name=f"{mode}, {how}",
-                    text=texts,
-                    hovertemplate=said,
-                )
+            figure.add_scatter(
+                x=angle,
+                y=values,
+                mode="markers",
+                marker=mark,
+                name=f"{mode}, {how}",
+                text=texts,
+                hovertemplate=said,
             )
     required = _PERCENT * view.found.required_damping
     figure.add_hline(y=required, line={"color": ALARM, "width": 1, "dash": "dash"})

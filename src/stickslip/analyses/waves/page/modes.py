@@ -215,15 +215,13 @@ def diameter_map(view: Waves[Modes]) -> Plot:
     given = np.array([w.reference_hz for w in view.found.waves if w.reference_hz is not None])
     if given.size:
         known, mode = np.nonzero(np.isfinite(given))
-        figure.add_trace(
-            go.Scatter(
-                x=np.array([w.nodal_diameter for w in view.found.waves])[known],
-                y=given[known, mode],
-                mode="markers",
-                name="reference",
-                hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
-                marker=ring(INK, 12, 1.2),
-            )
+        figure.add_scatter(
+            x=np.array([w.nodal_diameter for w in view.found.waves])[known],
+            y=given[known, mode],
+            mode="markers",
+            name="reference",
+            hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
+            marker=ring(INK, 12, 1.2),
         )
         reference = " Open circles are the frequencies to compare with."
     styled(figure, 520)

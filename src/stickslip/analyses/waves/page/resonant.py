@@ -47,7 +47,7 @@ def with_resonance(modes: xr.Dataset, tree: xr.DataTree) -> xr.Dataset:
 
 def _of_case(modes: xr.Dataset, own: dict[str, xr.Dataset], case: int) -> tuple[int, int] | None:
     """Return the indices of wave and mode in the modes of a case; None if nothing is known."""
-    known: Modes = record_of(Modes, one_case(modes, case))
+    known = record_of(Modes, one_case(modes, case))
     met: list[_Met] = []
     if "safe" in own:
         met = _of_safe(record_of(Interference, one_case(own["safe"], case)))

@@ -49,15 +49,13 @@ def safe_diagram(view: Waves[Interference]) -> Plot:
     figure = go.Figure(mode_lines(view))
     top = 1.08 * max(float(hertz(found).max()), float(orders.max()) * turns)
     x, y = zigzag(top, sectors, turns)
-    figure.add_trace(
-        go.Scatter(
-            x=x,
-            y=y,
-            mode="lines",
-            name="engine orders",
-            hoverinfo="skip",
-            line={"color": MUTED, "width": 1.2, "dash": "dash"},
-        )
+    figure.add_scatter(
+        x=x,
+        y=y,
+        mode="lines",
+        name="engine orders",
+        hoverinfo="skip",
+        line={"color": MUTED, "width": 1.2, "dash": "dash"},
     )
     unjudged = {pair.engine_order for pair in found.pairs if pair.judged is False}
     figure.add_trace(_orders(orders, unjudged, sectors, turns))
