@@ -23,9 +23,9 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 TWO_BLADES = {
-    "part.blades.airfoil_size_m": "0.012",
-    "part.blades.platform_size_m": "0.012",
-    "part.blades.foot_size_m": "0.016",
+    "part.blades.airfoil_size_m": "0.05",
+    "part.blades.platform_size_m": "0.02",
+    "part.blades.foot_size_m": "0.05",
     "vary.load.shaker.ratio": "[2000]",
     "forced_response.frequency_hz": "[185.0, 207.0]",
     "forced_response.points": "8",

@@ -31,7 +31,7 @@ from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.response.system import System
 
-COARSE = {"airfoil_size": 0.012, "platform_size": 0.012, "foot_size": 0.016}
+COARSE = {"airfoil_size": 0.05, "platform_size": 0.02, "foot_size": 0.05}
 HZ = 2 * math.pi
 FLAT = ElasticCoulomb(k_t=450e6, k_w=450e6, k_n=520e6, mu=0.6)
 CURVED = ElasticCoulomb(k_t=20e6, k_w=450e6, k_n=25e6, mu=0.6)

@@ -15,7 +15,14 @@ from typing import get_args
 
 import pytest
 import xarray as xr
-from small_v2 import write_example_deck, write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
+from small_v2 import (
+    TWO_BLADES,
+    write_example_deck,
+    write_four_masses,
+    write_shrouded_deck,
+    write_shrouded_sector,
+    write_two_blades,
+)
 from typer.testing import CliRunner, Result
 
 import stickslip
@@ -153,8 +160,15 @@ def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
 
 
 def with_few_cases(path: Path) -> None:
-    """Keep the first and the last value of a list that is varied: each is assembled and advised anew."""
-    head, table, rest = path.read_text(encoding="utf-8").partition("[vary]")
+    """Keep the first and the last value of a list that is varied, each assembled and advised anew, and mesh blades coarsely."""
+
+    def coarse(size: re.Match[str]) -> str:
+        return f"{size[1]}_size_m = {TWO_BLADES[f'part.blades.{size[1]}_size_m']}"
+
+    text = re.sub(
+        r"^(airfoil|platform|foot)_size_m = \S+", coarse, path.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    head, table, rest = text.partition("[vary]")
     path.write_text(head + table + re.sub(r"\[([^],\n]+)(?:, [^],\n]+)*(, [^],\n]+)\]", r"[\1\2]", rest, count=1))
 
 

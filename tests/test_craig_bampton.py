@@ -18,7 +18,7 @@ from stickslip.reduction.fixed_interface import craig_bampton
 
 pytestmark = pytest.mark.kernel
 
-COARSE = {"airfoil_size": 0.012, "platform_size": 0.012, "foot_size": 0.02}
+COARSE = {"airfoil_size": 0.05, "platform_size": 0.02, "foot_size": 0.05}
 
 
 @pytest.fixture(scope="module")

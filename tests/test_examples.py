@@ -27,7 +27,7 @@ def test_readme_shows_the_example():
 def test_python_example_finds_the_damped_resonance(capsys):
     """On a coarser mesh, whose resonances lie lower: the peak is that of the blades stuck together, damped by friction."""
     text = EXAMPLE.read_text()
-    coarse = "ss.BladePair(airfoil_size=0.012, platform_size=0.012, foot_size=0.016)"
+    coarse = "ss.BladePair(airfoil_size=0.05, platform_size=0.02, foot_size=0.05)"
     assert text.count("ss.BladePair()") == 1
     text = text.replace("ss.BladePair()", coarse)
     names = {"__name__": "__main__"}

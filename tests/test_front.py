@@ -153,7 +153,7 @@ def test_two_blades_in_fifteen_lines(tmp_path: Path, monkeypatch: pytest.MonkeyP
     code = [line for line in text.split('"""')[2].splitlines() if line.strip()]
     assert len(code) <= 15
     changes = {
-        "ss.BladePair()": "ss.BladePair(airfoil_size=0.012, platform_size=0.012, foot_size=0.016)",
+        "ss.BladePair()": "ss.BladePair(airfoil_size=0.05, platform_size=0.02, foot_size=0.05)",
         "hz=(150, 187), high=5, peak_points=12": "hz=(185, 207), points=4, peak_points=2, samples=64, stability='off'",
         "newton=22.1": "newton=0.221",
     }

@@ -142,7 +142,7 @@ def test_what_is_drawn_at_a_phase_is_the_harmonics_there_and_play_changes_colour
     drawn = data.drop_vars(others)  # other figures take longer to open than this one
     page.write_text(report_html(tree_of(provenance(), forced_response=drawn)), encoding="utf-8")
     browser.errors.clear()
-    browser.width(1200)
+    browser.width(480, 600)  # a picture in space takes its time by the pixel
     browser.open(page)
     assert browser.until("document.querySelector('#plot-in_motion canvas') !== null")
     own = motion_of_case(view, next(c for c in view.peaked if c.index == view.chosen))
