@@ -1,19 +1,17 @@
 """The table [all_motions] of a study file."""
 
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, custom_error, once, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, custom_error, once, rising_pair
 
 
 class AllMotionsTable(Section):
     """Search, within a budget, for motions that a sweep does not meet, and for the basins of attraction of all motions."""
 
-    frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
-        description="the range [lowest, highest] in Hz of the sweep and of all branches"
-    )
+    frequency_hz: Range = Field(description="the range [lowest, highest] in Hz of the sweep and of all branches")
     at_hz: list[Positive] | None = Field(
         None,
         min_length=1,

@@ -5,9 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, custom_error, rising_pair
 
-Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 STEPS = 1024  # time steps of a period, by shooting
 RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
 

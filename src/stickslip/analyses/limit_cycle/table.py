@@ -1,11 +1,11 @@
 """The table [limit_cycle] of a study file."""
 
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, once, rising_pair
+from stickslip.study.file.section import ModeNumbers, Positive, Range, Section, WaveNumbers, once, rising_pair
 
 MODES = 6  # modes of each wave that are examined, unless the study names modes
 
@@ -13,23 +13,17 @@ MODES = 6  # modes of each wave that are examined, unless the study names modes
 class LimitCycleTable(Section):
     """Self-excited motions: the amplitudes to which friction limits them, and the modes that it cannot limit."""
 
-    wave_numbers: list[Annotated[int, Field(ge=0, le=999)]] | None = Field(
+    wave_numbers: WaveNumbers | None = Field(
         None,
-        min_length=1,
-        max_length=200,
         description="wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: waves that are unstable with contacts stuck",
     )
-    modes: list[Annotated[int, Field(ge=1, le=999)]] | None = Field(
+    modes: ModeNumbers | None = Field(
         None,
-        min_length=1,
-        max_length=100,
         description=f"numbers of modes, by frequency with contacts stuck, from 1; left out: the unstable ones among the first {MODES}, of a mistuned wheel "
         f"{MODES} of each sector",
     )
-    amplitude_mm: list[Positive] | None = Field(
+    amplitude_mm: Range | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="the range [lowest, highest] of the amplitude of the peak output; left out: from where nothing slips to 300 times "
         "where slip begins",
     )

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, once, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, once, rising_pair
 
 
 class ModalSynthesisTable(Section):
@@ -15,10 +15,8 @@ class ModalSynthesisTable(Section):
     levels: list[Positive] = Field(
         [1.0], min_length=1, max_length=1000, description="factors on the harmonic loads, one response each"
     )
-    frequency_hz: list[Positive] | None = Field(
+    frequency_hz: Range | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="the range [lowest, highest] of the responses; left out: around their peaks",
     )
     direct: bool = Field(
@@ -31,10 +29,8 @@ class ModalSynthesisTable(Section):
         description="rates at which the frequency is swept through the range, each level at each of them; left out: none",
     )
     passage_down: bool = Field(False, description="whether the frequency falls in these passages")
-    amplitude_mm: list[Positive] | None = Field(
+    amplitude_mm: Range | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="the range [lowest, highest] of the amplitude of the nonlinear mode at the peak output; left out: from where nothing slips to "
         "300 times where slip begins",
     )

@@ -1,32 +1,26 @@
 """The table [nonlinear_mode] of a study file."""
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, once, rising_pair
+from stickslip.study.file.section import ModeNumbers, Positive, Range, Section, WaveNumbers, once, rising_pair
 
 
 class NonlinearModeTable(Section):
     """Frequency and damping ratio of modes over their amplitude, contacts stuck, slipping and lifting off."""
 
-    modes: list[Annotated[int, Field(ge=1, le=999)]] = Field(
+    modes: ModeNumbers = Field(
         [1],
-        min_length=1,
-        max_length=100,
         description="numbers of the modes that are followed, by frequency with contacts stuck, from 1",
     )
-    wave_numbers: list[Annotated[int, Field(ge=0, le=999)]] | None = Field(
+    wave_numbers: WaveNumbers | None = Field(
         None,
-        min_length=1,
-        max_length=200,
         description="wave numbers of a wheel, 0 to n - 1 with n sectors (k below n/2 travels backward, n - k forward); left out: the wave of the loads' engine order, without loads all",
     )
-    amplitude_mm: list[Positive] | None = Field(
+    amplitude_mm: Range | None = Field(
         None,
-        min_length=2,
-        max_length=2,
         description="the range [lowest, highest] of the amplitude of the peak output, as long as the motion has the shape of the linear mode; left "
         "out: from where nothing slips to 300 times where slip begins, or on to gross slip; springs that neither slip nor open need it",
     )

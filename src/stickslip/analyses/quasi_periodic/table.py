@@ -6,7 +6,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, custom_error, rising_pair
 
 MOST_ORDER = 31
 
@@ -14,7 +14,7 @@ MOST_ORDER = 31
 class QuasiPeriodicTable(Section):
     """Motions with two frequencies that are no multiples of each other."""
 
-    frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+    frequency_hz: Range | None = Field(
         None,
         description="the range [lowest, highest] in Hz of the first frequency, the frequency of all loads without their own",
     )

@@ -5,15 +5,13 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, rising_pair
+from stickslip.study.file.section import Range, Section, rising_pair
 
 
 class ResidualTractionsTable(Section):
     """Bounds of the response over the residual tractions that sticking contacts may have kept from before."""
 
-    frequency_hz: list[Positive] = Field(
-        min_length=2,
-        max_length=2,
+    frequency_hz: Range = Field(
         description="the range [lowest, highest] in which the bounds are computed, Hz; it should hold the resonance",
     )
     points: int = Field(25, ge=3, le=2000, description="frequencies in the range, 3 to 2000")

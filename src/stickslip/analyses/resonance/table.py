@@ -1,17 +1,17 @@
 """The table [resonance] of a study file."""
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, custom_error, once, rising_pair
+from stickslip.study.file.section import Range, Section, custom_error, once, rising_pair
 
 
 class ResonanceTable(Section):
     """Resonance peaks over a design parameter, each followed from value to value, without a sweep for each."""
 
-    frequency_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+    frequency_hz: Range = Field(
         description="the range [lowest, highest] in Hz in which peaks are looked for at the first and the last value"
     )
     parameter: str = Field(

@@ -1,18 +1,18 @@
 """The table [run_up] of a study file."""
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from stickslip.analyses.waves.tables import Order
-from stickslip.study.file.section import Positive, Section, custom_error, once, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, custom_error, once, rising_pair
 from stickslip.units import RPM
 
 
 class RunUpTable(Section):
     """The response over a range of speeds along engine orders, each speed with its own stiffness and preload."""
 
-    speeds_rpm: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+    speeds_rpm: Range = Field(
         description="the range [lowest, highest] of the speed in rpm, above zero, the lower first"
     )
     engine_orders: list[Order] | None = Field(

@@ -15,6 +15,9 @@ LARGEST_NUMBER = 1e30  # in the units of the file: products of ten such numbers 
 LONGEST_VALUE = 60  # largest number of characters of a value in a message
 
 Positive = Annotated[float, Field(gt=0)]
+Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]  # [lowest, highest]
+ModeNumbers = Annotated[list[Annotated[int, Field(ge=1, le=999)]], Field(min_length=1, max_length=100)]
+WaveNumbers = Annotated[list[Annotated[int, Field(ge=0, le=999)]], Field(min_length=1, max_length=200)]
 FilePath = Annotated[str, Field(min_length=1, max_length=500)]  # relative to the study's folder
 
 
