@@ -92,6 +92,17 @@ def input_error(place: str, problem: str, remedy: str, **words: str) -> InputErr
     return InputError(place, problem, remedy, words)
 
 
+def missing_file(place: str, path: object) -> InputError:
+    """Return the error for a file that a study names and that does not exist."""
+    return input_error(place, f"there is no file {path}", "Check the name; it is relative to the study's folder.")
+
+
+def no_wheel(place: str) -> InputError:
+    """Return the error for a table that needs a wheel in a model without one."""
+    remedy = "Give a part its number of sectors, or leave the table out."
+    return input_error(place, "is given, and the model is no sector of a wheel", remedy)
+
+
 def check_choice(place: str, value: object, choices: Collection[str], hint: str = "") -> None:
     """Raise an `InputError` unless `value` is one of the `choices`; a `hint` replaces the list of choices as remedy."""
     if value in choices:

@@ -132,11 +132,15 @@ def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[Stuc
     return stuck_modes(system, count, holds)
 
 
-def name_of_mode(label: str, wave: int, mode: StuckMode) -> str:
-    """Return the name of a mode in the log: case, wave, number, frequency and damping ratio."""
-    of = "" if wave == NO_WAVE else f"wave {wave}, "
-    case = f"{label}: " if label else ""
-    return f"{case}{of}mode {mode.number} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
+def mode_name(wave: int, number: int) -> str:
+    """Return the name of a mode; that of a single structure has no wave."""
+    return f"mode {number}" if wave == NO_WAVE else f"wave {wave}, mode {number}"
+
+
+def mode_told(label: str, wave: int, mode: StuckMode) -> str:
+    """Return a mode in the log: case, name, frequency and damping ratio."""
+    case, name = f"{label}: " if label else "", mode_name(wave, mode.number)
+    return f"{case}{name} ({mode.omega / HZ:.3f} Hz, damping ratio {100 * mode.ratio:+.4g} %)"
 
 
 def known_coordinates(model: Assembled) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, st
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, joined_displacements, static_state
 from stickslip.contact.law import check_law_members, held_stiffness
-from stickslip.errors import check_choice, input_error
+from stickslip.errors import check_choice, input_error, no_wheel
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
 from stickslip.model.facts import Facts, facts_of_parts, other_speeds, unlike_units
@@ -134,11 +134,7 @@ class Model:
             if one is None:
                 continue
             if self.sectors == 1:
-                raise input_error(
-                    name,
-                    "is given, and the model is no sector of a wheel",
-                    "Give a part its number of sectors, or leave the table out.",
-                )
+                raise no_wheel(name)
             if is_staged(self.joins):
                 raise input_error(name, "is of one wheel, and a join couples several", "Leave one out.")
             one.require(self.sectors)

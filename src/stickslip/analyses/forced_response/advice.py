@@ -190,9 +190,7 @@ def _frequencies_far_off(question: Question) -> Iterator[str]:
     """Yield the doubt about a range that lies far from all natural frequencies."""
     if len(question.driven) > 1:
         return
-    lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
-    known = question.model.frequencies
-    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    (lowest, highest), every = question.driven_hz, question.natural_hz
     every = every[every > RIGID]
     if not every.size:
         return

@@ -14,6 +14,7 @@ from stickslip.analyses.forced_response.estimate import check_limits, estimate, 
 from stickslip.analyses.forced_response.shooting import require_in_time, require_shooting, shooting_sweep, stepping_of
 from stickslip.analyses.forced_response.stability.examination import examines_every_wave
 from stickslip.analyses.forced_response.table import ForcedResponse
+from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.assembling import assemble, more_modes
 from stickslip.assembly.build import static_state
@@ -215,6 +216,18 @@ class Question:
         """Harmonics of the load."""
         forces = self.model.load.harmonics
         return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
+
+    @property
+    def driven_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the first of these harmonics, Hz."""
+        lowest, highest = (self.driven[0] * omega / HZ for omega in self.sweep.omega_range)
+        return lowest, highest
+
+    @property
+    def natural_hz(self) -> FloatArray:
+        """Natural frequencies with open and with stuck contacts, Hz."""
+        known = self.model.frequencies
+        return np.concatenate([known.free_reduced, known.stuck_reduced])
 
     @property
     def driven_names(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycl
 from stickslip.analyses.limit_cycle.table import LimitCycleTable
 from stickslip.analyses.limit_cycle.time import compete, settle_cycles
 from stickslip.analyses.limit_cycle.verdicts import case_verdicts, tables
-from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates, name_of_mode
+from stickslip.analyses.vibrating import as_wave, coordinate, known_coordinates, mode_name, mode_told
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
 from stickslip.reduction.waves import NO_WAVE
@@ -50,7 +50,7 @@ def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iter
         if i < len(done):
             continue
         branch = follow_mode(question, wave, mode)
-        name = name_of_mode(question.label, wave, mode)
+        name = mode_told(question.label, wave, mode)
         LOG.info(f"{name}: {_told(branch)}")
         advance((i + 1) / len(tasks), name)
         found.append(branch)
@@ -195,8 +195,8 @@ def _check(case: Case, model: Model) -> tuple[str, ...]:
     lines = []
     for wave in question.waves:
         for mode in question.followed(question.modes(wave)):
-            of = "" if wave == NO_WAVE else f"wave {wave}, "
-            lines.append(f"limit_cycle: {of}mode {mode.number}, damping ratio {100 * mode.ratio:+.3g} %")
+            name = mode_name(wave, mode.number)
+            lines.append(f"limit_cycle: {name}, damping ratio {100 * mode.ratio:+.3g} %")
     why = too_long(question.model.system, forced=False)
     stability = f"limit_cycle: stability not examined, {why}" if why else ""
     none = "limit_cycle: no mode grows with contacts stuck"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.vibrating import KeptMotions, kept_motions
+from stickslip.analyses.vibrating import KeptMotions, kept_motions, mode_name
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.column import column, rows
 from stickslip.reduction.waves import NO_WAVE, wave
@@ -70,7 +70,7 @@ class CycleBranch:
     @property
     def name(self) -> str:
         """Name of the mode."""
-        return f"mode {self.mode}" if self.wave_number < 0 else f"wave {self.wave_number}, mode {self.mode}"
+        return mode_name(self.wave_number, self.mode)
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:

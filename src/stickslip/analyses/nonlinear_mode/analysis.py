@@ -10,10 +10,9 @@ from stickslip.analyses.nonlinear_mode.problem import NAME, Question, question_o
 from stickslip.analyses.nonlinear_mode.records import END, ModeRecord, NonlinearModes, answer, mode_record
 from stickslip.analyses.nonlinear_mode.table import NonlinearModeTable
 from stickslip.analyses.nonlinear_mode.verdicts import case_verdicts, tables
-from stickslip.analyses.vibrating import as_wave, known_coordinates, name_of_mode
+from stickslip.analyses.vibrating import as_wave, known_coordinates, mode_name, mode_told
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
-from stickslip.reduction.waves import NO_WAVE
 from stickslip.response.nonlinear_modes.backbone import mode_way
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
@@ -31,7 +30,7 @@ def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Itera
         before = [r for r in done if (r.wave_number, r.mode) == (wave, mode.number)]
         if before and before[-1].kind == END:
             continue
-        name = name_of_mode(question.label, wave, mode)
+        name = mode_told(question.label, wave, mode)
         for record in follow_mode(question, wave, mode, before):
             if record.kind == END:
                 LOG.info(f"{name}: {record.problem or record.end}")
@@ -84,7 +83,7 @@ def _check(case: Case, model: Model) -> tuple[str, ...]:
     question = question_of(case, model)
     each = [(wave, mode) for wave in question.waves for mode in question.followed(wave)]
     return tuple(
-        f"{NAME}: {'' if wave == NO_WAVE else f'wave {wave}, '}mode {mode.number}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"
+        f"{NAME}: {mode_name(wave, mode.number)}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"
         for wave, mode in each
     )
 

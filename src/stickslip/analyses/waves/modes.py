@@ -26,7 +26,7 @@ from stickslip.analyses.waves.verdicts import modes_tables
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.wheel_modes import wheel_modes
-from stickslip.errors import input_error
+from stickslip.errors import input_error, missing_file
 from stickslip.reduction.waves import wave
 from stickslip.study.analysis import Case, Notes, Solved
 from stickslip.study.verdict import Verdict
@@ -100,9 +100,7 @@ def read_reference(path: Path, case: str | None) -> Reference:
         If the file or a column is missing, or a line cannot be read.
     """
     if not path.is_file():
-        raise input_error(
-            "modes.reference", f"there is no file {path}", "Check the name; it is relative to the study's folder."
-        )
+        raise missing_file("modes.reference", path)
     found, speeds = _rows(path, case)
     named = _SPEED.search(case or "")
     if named and not speeds:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error, missing_file, no_wheel
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
 from stickslip.reduction.aerodynamics import InfluenceCoefficients, from_phase_angles, one_twice
 from stickslip.study.file.model.aero import AeroTable
@@ -31,17 +31,9 @@ def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[I
             yield input_error("flutter", "needs aerodynamic coefficients", "Add the table [aero] with their file.")
         return
     if sectors == 1:
-        yield input_error(
-            "aero",
-            "is given, and the model is no sector of a wheel",
-            "Give a part its number of sectors, or leave the table out.",
-        )
+        yield no_wheel("aero")
     if not (home / table.file).is_file():
-        yield input_error(
-            "aero.file",
-            f"there is no file {home / table.file}",
-            "Check the name; it is relative to the study's folder.",
-        )
+        yield missing_file("aero.file", home / table.file)
 
 
 def knows_speeds(table: AeroTable | None, home: Path) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 from stickslip.assembly.contact import ALONE, GROUND, NEXT, SPATIAL
 from stickslip.assembly.forces import engine_order
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
-from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
+from stickslip.errors import InputError, did_you_mean, input_error, missing_file, nearest_and_known, together
 from stickslip.model.structure import is_numbered
 from stickslip.study.file.model.bodies import BODIES, Cylinder, FlatCurved, RigidBodyTable, Wedge
 from stickslip.study.file.model.contacts import law_class
@@ -104,11 +104,7 @@ def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
                         "Give a file: what comes out of a pipe has to be written into one.",
                     )
                 elif not (home / file).is_file():
-                    yield input_error(
-                        f"part.{name}.{key}",
-                        f"there is no file {home / file}",
-                        "Check the name; it is relative to the study's folder.",
-                    )
+                    yield missing_file(f"part.{name}.{key}", home / file)
         if isinstance(table, Copy):
             yield from _copied(tables, name, table.of)
         if isinstance(table, PrismBlades):

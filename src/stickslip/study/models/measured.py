@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import did_you_mean, input_error, missing_file
 from stickslip.model.readers.measured_columns import LENGTHS, MeasuredColumns, read_columns
 from stickslip.study.file.case_names import assignments, written
 from stickslip.study.file.study import StudyFile, TablesOfCase
@@ -101,8 +101,7 @@ def measured_peaks(file: StudyFile) -> MeasuredPeaks | None:
     key = _varied_number(file)
     path = file.home / table.file
     if not path.is_file():
-        problem = f"there is no file {path}"
-        raise input_error(f"{file.path}: {PLACE}", problem, "Check the name; it is relative to the study's folder.")
+        raise missing_file(f"{file.path}: {PLACE}", path)
     columns = read_columns(path)
     others = [k for k in file.cases[0].values if k != key]
     _check_names(columns, key, others)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.fluid.pressure import PressureField
-from stickslip.errors import InputError, input_error, missing_package
+from stickslip.errors import InputError, input_error, missing_file, missing_package
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
 from stickslip.study.file.tables import Tables
 from stickslip.units import DEG
@@ -30,11 +30,7 @@ def pressure_refusals(tables: Tables, home: Path) -> Iterator[InputError]:
     """Yield errors about missing pressure files."""
     for name, load in tables.load.items():
         if load.pressure is not None and not (home / load.pressure).is_file():
-            yield input_error(
-                f"load.{name}.pressure",
-                f"there is no file {home / load.pressure}",
-                "Check the name; it is relative to the study's folder.",
-            )
+            yield missing_file(f"load.{name}.pressure", home / load.pressure)
 
 
 def read_pressure(path: Path, length_unit: str, *, static: bool) -> PressureField:

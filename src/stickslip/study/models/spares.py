@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from stickslip.assembly.contact import NEXT
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error, missing_file, no_wheel
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import Lumped
 from stickslip.study.file.tables import Tables, original
@@ -21,11 +21,7 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
     for name, table in tables.mistuning.items():
         key = f"mistuning.{name}"
         if sectors == 1:
-            yield input_error(
-                key,
-                "is given, and the model is no sector of a wheel",
-                "Give a part its number of sectors, or leave the table out.",
-            )
+            yield no_wheel(key)
         if table.contact is not None and table.contact not in tables.contact:
             known = list(tables.contact)
             yield input_error(
@@ -37,11 +33,7 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
             known = list(tables.part)
             yield input_error(f"{key}.of", f"there is no part {head!r}", did_you_mean(head, known))
         if table.file is not None and not (home / table.file).is_file():
-            yield input_error(
-                f"{key}.file",
-                f"there is no file {home / table.file}",
-                "Check the name; it is relative to the study's folder.",
-            )
+            yield missing_file(f"{key}.file", home / table.file)
         given = table.deviations or table.gaps_m or []
         if sectors is not None and given and sectors % len(given):
             yield input_error(

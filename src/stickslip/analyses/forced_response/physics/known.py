@@ -101,9 +101,7 @@ def no_resonance(question: Question) -> tuple[Verdict, ...]:
     """Doubt a sweep without any natural frequency, with contacts open or stuck."""
     if len(question.driven) > 1:  # natural frequencies are known for one harmonic
         return ()
-    lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
-    known = question.model.frequencies
-    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    (lowest, highest), every = question.driven_hz, question.natural_hz
     if not every.size or np.any((every >= lowest) & (every <= highest)):
         return ()
     near = float(every[np.argmin(np.maximum(lowest - every, every - highest))])
