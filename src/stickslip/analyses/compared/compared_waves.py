@@ -1,40 +1,40 @@
 """Other analyses of compared designs: nonlinear modes, flutter margins, limit cycles."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import plotly.graph_objects as go
-import xarray as xr
 from plotly.subplots import make_subplots
 
 from stickslip.analyses.compared.designs import Design
-from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
+from stickslip.analyses.limit_cycle.page import SECTION as LIMIT_CYCLES
+from stickslip.analyses.limit_cycle.page import cycle_table
+from stickslip.analyses.nonlinear_mode.page import SECTION as MODES
 from stickslip.analyses.nonlinear_mode.page import Modes
 from stickslip.analyses.nonlinear_mode.page import table as mode_table
+from stickslip.analyses.waves.page.flutter import SECTION as FLUTTER
 from stickslip.analyses.waves.page.flutter import margins
-from stickslip.analyses.waves.page.waves import view_of
+from stickslip.analyses.waves.page.waves import Waves
 from stickslip.analyses.waves.records import Flutter
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import DASHES, INK, Plot, styled
 from stickslip.report.quantities import NONE, scale_for
 from stickslip.report.result import Node, analysis
-from stickslip.report.section import Content
+from stickslip.report.section import Content, Section
 
 View = TypeVar("View", bound=Node)
 
 
-def told_by(
-    designs: Sequence[Design], name: str, kind: Callable[[xr.Dataset], View], needed: Sequence[str]
-) -> list[tuple[Design, str, View]]:
-    """Return every case of the designs with an analysis: design, label, view."""
+def told_by(designs: Sequence[Design], section: Section) -> list[tuple[Design, str, Any]]:
+    """Return every case of the designs with the analysis of a section: design, label, view."""
     found = []
     for design in designs:
-        if name in design.tree.children:
-            data = analysis(design.tree, name)
+        if section.name in design.tree.children:
+            data = analysis(design.tree, section.name)
             for k in range(data.sizes.get("case", 1)):
-                view = kind(data.isel(case=k) if "case" in data.dims else data)
-                if view.has(*needed):
+                view = section.view(data.isel(case=k) if "case" in data.dims else data)
+                if view.has(*section.needs):
                     found.append((design, view.text("case_label"), view))
     return found
 
@@ -57,8 +57,7 @@ def stacked(views: Sequence[tuple[Design, str, View]], table: Callable[[View], T
 
 def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
     """Return figure and table of the nonlinear modes: frequency and damping over the amplitude."""
-    needed = ("mode", "frequency_hz", "damping_ratio", "amplitude", "status")
-    views = told_by(designs, "nonlinear_mode", Modes, needed)
+    views: list[tuple[Design, str, Modes]] = told_by(designs, MODES)
     if not views:
         return []
     every = np.concatenate([branch.amplitude for _, _, v in views for branch in v.found.branches])
@@ -95,7 +94,7 @@ def nonlinear_modes(designs: Sequence[Design]) -> list[Content]:
 
 def flutter(designs: Sequence[Design]) -> list[Content]:
     """Return figure and table of the flutter margins: damping over the phase angle, and all waves."""
-    views = told_by(designs, "flutter", view_of(Flutter), ("phase_angle_deg", "damping", "frequency_hz"))
+    views: list[tuple[Design, str, Waves[Flutter]]] = told_by(designs, FLUTTER)
     if not views:
         return []
     figure = go.Figure()
@@ -124,4 +123,4 @@ def flutter(designs: Sequence[Design]) -> list[Content]:
 
 def limit_cycles(designs: Sequence[Design]) -> list[Content]:
     """Return the limit cycles of all designs in one table."""
-    return stacked(told_by(designs, "limit_cycle", Cycles, ("linear_damping_ratio",)), cycle_table)
+    return stacked(told_by(designs, LIMIT_CYCLES), cycle_table)

@@ -44,70 +44,37 @@ def _of_line(label: str, found: RunUp, line: Line) -> Iterator[Verdict]:
         )
         return
     if line.failed:
-        yield Verdict(
-            "doubtful",
-            label,
-            None,
-            f"{name}: {line.failed} of {len(found.along(line))} points have no solution",
-            "Give more points, or look at a [forced_response] at such a speed.",
-        )
+        why = f"{name}: {line.failed} of {len(found.along(line))} points have no solution"
+        remedy = "Give more points, or look at a [forced_response] at such a speed."
+        yield Verdict("doubtful", label, None, why, remedy)
     if top.error > found.limit:
-        yield Verdict(
-            "doubtful",
-            label,
-            hertz,
-            f"{name}: missing harmonics may change the peak by {100 * top.error:.2g} %",
-            "Raise harmonics.high.",
-        )
+        why = f"{name}: missing harmonics may change the peak by {100 * top.error:.2g} %"
+        yield Verdict("doubtful", label, hertz, why, "Raise harmonics.high.")
     if np.isnan(top.error):
         why = f"{name}: whether more harmonics than H = {top.harmonic} change the peak was not examined"
         yield Verdict("doubtful", label, hertz, why, 'harmonics.high = "auto" examines it.')
     if line.speed_error > BETWEEN:
-        yield Verdict(
-            "doubtful",
-            label,
-            None,
-            f"{name}: between the speeds at which the model was assembled its matrices are off by {line.speed_error:.1e}",
-            "Take a narrower range of speeds, or a smaller run_up.tolerance.",
-        )
+        why = f"{name}: between the speeds at which the model was assembled its matrices are off by {line.speed_error:.1e}"
+        remedy = "Take a narrower range of speeds, or a smaller run_up.tolerance."
+        yield Verdict("doubtful", label, None, why, remedy)
     if not line.peak_inside:
-        yield Verdict(
-            "trusted",
-            label,
-            hertz,
-            f"{name}: the largest amplitude is at an end of the range",
-            "Widen speeds_rpm to see the resonance.",
-        )
+        why = f"{name}: the largest amplitude is at an end of the range"
+        yield Verdict("trusted", label, hertz, why, "Widen speeds_rpm to see the resonance.")
 
 
 def _of_fast(label: str, fast: FastRunUp) -> Iterator[Verdict]:
     name = f"engine order {fast.engine_order} at {fast.rate:g} rpm/s"
     if not fast.finished:
-        yield Verdict(
-            "doubtful",
-            label,
-            None,
-            f"{name}: the fast run-up was not followed to its end",
-            "Take a smaller range of speeds, or another rate.",
-        )
+        why = f"{name}: the fast run-up was not followed to its end"
+        yield Verdict("doubtful", label, None, why, "Take a smaller range of speeds, or another rate.")
     elif fast.peak_at_end:
         # without a peak there is no error of a peak
-        yield Verdict(
-            "trusted",
-            label,
-            None,
-            f"{name}: the largest amplitude is at an end of the range",
-            "Widen speeds_rpm to see the peak.",
-        )
+        why = f"{name}: the largest amplitude is at an end of the range"
+        yield Verdict("trusted", label, None, why, "Widen speeds_rpm to see the peak.")
         return
     if fast.neglected > TOO_FAST:
-        yield Verdict(
-            "doubtful",
-            label,
-            None,
-            f"{name}: the amplitude varies so fast that {100 * fast.neglected:.2g} % of its change is left out, and the peak may be off by as much",
-            "Take a slower rate, or integrate in time.",
-        )
+        why = f"{name}: the amplitude varies so fast that {100 * fast.neglected:.2g} % of its change is left out, and the peak may be off by as much"
+        yield Verdict("doubtful", label, None, why, "Take a slower rate, or integrate in time.")
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
