@@ -268,6 +268,40 @@ def test_what_is_wrong_in_the_table_is_told(change: tuple[str, str], words: str,
     assert words in wrong(tmp_path, recorded_rows(), change)
 
 
+def test_what_answers_are_compared_with_is_no_reason_to_solve_them_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A reference, engine orders, a margin and a damping that is asked for change what is said of modes, and no mode."""
+    save_structure(sector(), tmp_path / "sector.npz")
+    (tmp_path / "aero.csv").write_text("\n".join(recorded_rows()))
+    path = tmp_path / "study.toml"
+
+    def ran(modes: str, safe: str, flutter: str) -> tuple[ss.Result, str]:
+        tables = f"{flutter}\n[modes]\n{modes}\n[safe]\nspeed_rpm = 6.0\nmodes = 2\n{safe}\n"
+        path.write_text(STUDY.format(file="aero.csv") + tables)
+        caplog.clear()
+        with caplog.at_level(logging.INFO):
+            found = ss.Study.from_file(path).run()
+        return found, re.findall(r"jobs to do: \d", caplog.text)[0]
+
+    before, said = ran("number = 2", "engine_orders = [1]", "")
+    assert said == "jobs to do: 3"
+    hertz = float(before["modes"].frequency_hz[0, 0, 0])
+    (tmp_path / "ref.csv").write_text(f"nodal_diameter,mode,frequency_hz\n0,1,{1.01 * hertz!r}\n")
+    compared = (
+        'number = 2\nreference = "ref.csv"',
+        "engine_orders = [2]\nmargin_percent = 7.0",
+        "required_percent = 1.0",
+    )
+    after, said = ran(*compared)
+    assert said == "jobs to do: 0"
+    assert float(after["modes"].difference[0, 0, 0]) == pytest.approx(1 / 1.01 - 1, abs=1e-9)
+    assert set(after["safe"].pair_engine_order.values.ravel().tolist()) == {2}
+    assert float(after["safe"]["margin_percent"][0]) == 7.0
+    assert float(after["flutter"]["required_damping"][0]) == pytest.approx(0.01)
+    assert ran("number = 1", *compared[1:])[1] == "jobs to do: 1"
+
+
 def test_flutter_without_coefficients_and_outside_of_their_table_is_refused() -> None:
     with pytest.raises(ss.InputError, match="needs aerodynamic coefficients"):
         model(None).flutter()
