@@ -159,7 +159,7 @@ class Places:
         facets = facets_of(mesh, nodes)
         place = np.full(len(mesh.points), -1)
         place[nodes] = np.arange(len(nodes))
-        return self._nodal(name, head, mesh.numbers[nodes], mesh.points[nodes], place[facets])
+        return self._nodal(name, head, mesh.numbers[nodes], mesh.points[nodes], _renumbered(facets, place))
 
     def _dof_set(self, name: str, head: str, members: IntArray) -> Spot:
         table = self.parts[head].structure.dofs
@@ -277,7 +277,7 @@ def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
     kept, lost = (_middles(mesh.points, facets) for facets in (facets_of(mesh, own), rim))
     near = cKDTree(kept[0]).query(lost[0])[1]
     flush = rim[np.einsum("pc,pc->p", lost[1], kept[1][near]) > SMOOTH]
-    return flush, np.setdiff1d(flush, own)
+    return flush, np.setdiff1d(flush[flush >= 0], own)
 
 
 def with_rim(places: Places, spot: Spot) -> Surface:
@@ -295,13 +295,19 @@ def with_rim(places: Places, spot: Spot) -> Surface:
     return Surface(
         np.vstack([surface.points, mesh.points[still]]),
         moving,
-        np.vstack([surface.facets, place[facets]]),
+        np.vstack([surface.facets, _renumbered(facets, place)]),
         numbers=np.concatenate([mesh.numbers[own], mesh.numbers[still]]),
     )
+
+
+def _renumbered(facets: IntArray, place: IntArray) -> IntArray:
+    """Return facets (m, k) by the new places of their nodes; fillers -1 stay."""
+    return np.where(facets >= 0, place[facets], -1)
 
 
 def _middles(points: FloatArray, facets: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the centres of facets and their unit normals."""
     normal = normals(points, facets, centres(facets))
-    middle = points[facets].mean(axis=1)
+    own = (facets >= 0)[:, :, None]
+    middle = np.sum(points[facets], axis=1, where=own) / own.sum(axis=1)
     return middle, normal / np.linalg.norm(normal, axis=1, keepdims=True)

@@ -164,7 +164,7 @@ def meet(points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatAr
     missed : indices of lines that do not meet their facet, because it is folded or parallel to them
     """
     reference = centres(facets)
-    size = np.abs(points[facets] - origin[:, None]).max(axis=(1, 2))
+    size = np.abs(points[facets] - origin[:, None]).max(axis=(1, 2), where=(facets >= 0)[:, :, None], initial=0.0)
     for _ in range(MAX_GAUSS_NEWTON):
         miss = np.einsum("pac,pc->pa", axes, origin - positions(points, facets, reference))
         slope = np.einsum("pac,pbc->pab", axes, tangents(points, facets, reference))

@@ -62,7 +62,10 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
         raise input_error(KEY, f"there is no set {name!r} in the mesh", "Name both faces.")
     facets = facets_of(mesh, np.union1d(free, np.flatnonzero(held)))
     facets = facets[np.isin(facets, free).any(axis=1)]
-    nodes, place = np.unique(facets, return_inverse=True)
+    own = facets >= 0
+    nodes, number = np.unique(facets[own], return_inverse=True)
+    place = np.full(facets.shape, -1)
+    place[own] = number
     rows = node_rows(part.structure.dofs, mesh.numbers[nodes])[:, :3]
     partly = (rows >= 0).any(axis=1) & (rows < 0).any(axis=1)
     if partly.any():
@@ -80,7 +83,7 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
             "Match the faces node by node, or give the disk a bore.",
         )
     nothing = scipy.sparse.csr_array((3 * nodes.size, part.structure.n))
-    surface = Surface(mesh.points[nodes], nothing, place.reshape(facets.shape), numbers=mesh.numbers[nodes])
+    surface = Surface(mesh.points[nodes], nothing, place, numbers=mesh.numbers[nodes])
     return surface, rows
 
 

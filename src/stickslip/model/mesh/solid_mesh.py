@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -124,10 +125,7 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
     """Write the mesh for ParaView (``.vtu``) or gmsh (``.msh``); node sets become point data."""
     if path.suffix not in {".vtu", ".msh"}:
         raise input_error(str(path), f"unknown mesh format {path.suffix!r}", "Use .vtu or .msh.")
-    try:
-        import meshio
-    except ModuleNotFoundError as error:
-        raise missing_package("meshio", error, "fe") from error
+    meshio = mesh_writer()
     flags = {}
     for name, nodes in mesh.node_sets.items():
         flags[name] = np.zeros(len(mesh.points))
@@ -141,6 +139,19 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
         meshio.write(path, data, file_format="gmsh22", binary=True)
     else:
         meshio.write(path, data)
+
+
+def mesh_writer() -> Any:
+    """Return the module meshio; if it is missing, a `StickslipError` says how to install it."""
+    try:
+        import meshio
+        from meshio._mesh import topological_dimension
+    except ModuleNotFoundError as error:
+        raise missing_package("meshio", error, "fe") from error
+    # meshio 5.3.5 writes these cells, but its list of dimensions lacks them
+    for kind in ("wedge15", "pyramid13"):
+        topological_dimension.setdefault(kind, 3)
+    return meshio
 
 
 def cell_blocks(cells: IntArray) -> list[tuple[str, IntArray]]:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.errors import missing_package
-from stickslip.model.mesh.solid_mesh import by_kind, cell_blocks
+from stickslip.model.mesh.solid_mesh import by_kind, cell_blocks, mesh_writer
 from stickslip.study.exchange.contacts import ContactMotion
 from stickslip.study.exchange.motion import Motion
 from stickslip.study.store.atomic_write import whole_file, write_whole
@@ -100,10 +99,7 @@ def _cells(motion: Motion) -> tuple[Cells, dict[str, list[IntArray]]]:
 def _write(
     path: Path, points: FloatArray, cells: Cells, fields: Mapping[str, Any], numbers: Mapping[str, list[IntArray]]
 ) -> None:
-    try:
-        import meshio
-    except ModuleNotFoundError as error:
-        raise missing_package("meshio", error, "fe") from error
+    meshio = mesh_writer()
     data = meshio.Mesh(points, cells, point_data=dict(fields), cell_data=dict(numbers))
     with whole_file(path) as temporary:
         meshio.write(temporary, data, file_format="vtu")
