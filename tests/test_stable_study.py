@@ -25,7 +25,11 @@ from stickslip.analyses.forced_response.stability.examining import (
     with_stable_peak,
 )
 from stickslip.analyses.forced_response.stability.in_time import (
+    FLOPS,
     MOST_TOLD,
+    PATIENCE,
+    STEP_FLOPS,
+    STEPS,
     Check,
     check_in_time,
     seconds_in_time,
@@ -128,7 +132,7 @@ def test_a_known_multiplier_comes_out_and_the_motion_in_time_leaves() -> None:
     assert found.multiplier == pytest.approx(known, rel=1e-9)
     assert found.error < 1e-9
     assert "lies outside the unit circle" in found.sentence
-    check = check_in_time(asked, response, response.top, found.multiplier)
+    check, _ = check_in_time(asked, response, response.top, found.multiplier)
     assert check.motion == "not periodic"
     assert with_motion(found, check) == found
 
@@ -140,7 +144,7 @@ def test_what_is_compared_is_the_harmonic_that_the_load_drives() -> None:
     asked = question(system, third, sweep)
     response = response_of(asked)
     accepted = response.accepted[2]
-    check = check_in_time(asked, response, accepted)
+    check, _ = check_in_time(asked, response, accepted)
     turns = 3 * accepted.point.omega  # a pressed contact: k = 2, c = 0.02
     assert check.balance == pytest.approx(0.005 / abs(2 - turns**2 + 0.02j * turns), rel=1e-6)
     assert abs(check.difference_percent) < 0.01
@@ -156,7 +160,7 @@ def test_a_peak_under_friction_is_stable_and_attained() -> None:
     assert found.verdict == "stable"
     assert 0.5 < found.multiplier < 1.0 - found.error
     assert "disturbances die" in found.sentence
-    check = check_in_time(asked, response, response.top)
+    check, _ = check_in_time(asked, response, response.top)
     assert check.motion == "attained"
     assert "attained" in check.sentence
 
@@ -179,7 +183,7 @@ def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides(decided
     assert set(data.verify_motion.values.tolist()) == {"attained"}
     # followed for as long as a disturbance needs to decay a thousandfold
     assert int(data.verify_periods[integrated.index(float(data.peak_frequency_hz[0]))]) >= shows_after(size)
-    assert 1 < len(integrated) <= 1 + with_stability.MOST_DOUBTS
+    assert len(integrated) > 1
     assert not np.any(data.motion_stability.values == 2)  # undecided
 
 
@@ -199,7 +203,7 @@ def test_nothing_is_examined_or_integrated_twice(decided_in_time: Solved, monkey
     first = dataset(whole)
     times: list[str] = []
     monkeypatch.setattr(with_stability, "examine", lambda *_: times.append("examined"))
-    monkeypatch.setattr(with_stability, "check_in_time", lambda *_: times.append("integrated"))
+    monkeypatch.setattr(with_stability, "check_in_time", lambda *_, **__: times.append("integrated"))
 
     class Kept:
         def __init__(self) -> None:
@@ -393,7 +397,8 @@ def test_the_integration_of_a_wheel_counts_all_sectors_that_are_marched() -> Non
     whole = on_a_wheel(small, 30, 1, every=True).model.system
     one = replace(whole, structure=whole.structure.waves[0])
     assert sectors_in_time(whole) == 12
-    assert seconds_in_time(whole) > 12**2 * seconds_in_time(one)
+    base = PATIENCE * STEPS * STEP_FLOPS / FLOPS  # of any system
+    assert seconds_in_time(whole) - base > 12**2 * (seconds_in_time(one) - base)
     even = replace(whole.structure, engine_order=6, waves={0: one.structure, 6: one.structure})
     assert sectors_in_time(replace(whole, structure=even)) == 2
 
@@ -530,7 +535,7 @@ def test_the_wave_that_grows_is_named(
 def test_a_model_that_has_no_form_in_time_keeps_its_doubts(monkeypatch: pytest.MonkeyPatch) -> None:
     """An integration that nobody asked for ends no case."""
 
-    def refused(*_: object) -> Check:
+    def refused(*_: object, **__: object) -> Check:
         raise input_error("time integration", "has no form for this", "None.")
 
     asked = undecided(monkeypatch)

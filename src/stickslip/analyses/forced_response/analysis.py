@@ -46,7 +46,7 @@ from stickslip.analyses.forced_response.stability.not_periodic import (
     of_answers,
     without_periodic,
 )
-from stickslip.analyses.forced_response.stability.stable import Examined, with_motion
+from stickslip.analyses.forced_response.stability.stable import Examined, with_motion, without_raised
 from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
 from stickslip.analyses.forced_response.stability.with_stability import integrated, with_stability
 from stickslip.analyses.forced_response.summary import tables
@@ -207,12 +207,12 @@ def _store_notes(question: Question, response: Response, examined: Sequence[Exam
 def _judge(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
     """Run the requested time integrations, and return the stability with their outcome."""
     chosen_points = chosen(question, response) if IN_TIME in question.checks else []
-    checks = {a.point.omega: integrated(question, response, a, examined, notes) for a in chosen_points}
+    checks = {a.point.omega: integrated(question, response, a, examined, notes)[0] for a in chosen_points}
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
     for accepted in response.accepted:
         known = notes.get(f"{IN_TIME}.{accepted.point.omega!r}")
         if known:
-            checks.setdefault(accepted.point.omega, Check(**known))
+            checks.setdefault(accepted.point.omega, Check(**without_raised(known)))
     if checks:
         notes.put(IN_TIME, of_checks([checks[omega] for omega in sorted(checks)]))
     attained = [omega for omega, check in checks.items() if check.motion == "attained"]

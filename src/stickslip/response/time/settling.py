@@ -10,6 +10,8 @@ from stickslip.arrays import ComplexArray, FloatArray
 
 SettlingStatus = Literal["settled", "unsettled", "diverged"]
 LONGEST_MEMORY = 1e4  # periods; slowest assumed decay of a structure (damping ratio 1.6e-5)
+RINGING = slice(96, None, 32)  # periods after which a motion may be found to ring; a decay by 1 % a period shows in 32
+STEADY = (0.8, 1.1)  # largest change of the last stretch over the one before, if neither decay nor growth is seen
 OVERFLOW = 1e100  # far above every motion, with a finite square
 
 
@@ -83,9 +85,20 @@ class Progress:
             self.remaining = remaining_change(self.changes)
             self.status = "settled" if self.remaining < tolerance else "unsettled"
 
-    def goes_on(self, least: int) -> bool:
-        """Whether to continue: not after an overflow, and in a settled motion only up to `least` periods."""
-        return self.status == "unsettled" or (self.status == "settled" and self.periods < least)
+    def goes_on(self, least: int, rings: float = 0.0) -> bool:
+        """Whether to continue: not after an overflow, and in a settled or ringing motion only up to `least` periods.
+
+        A motion rings if it stays within `rings` of its average, and its changes neither decay nor grow.
+        """
+        if self.status == "unsettled":
+            return self.periods < least or not self._rings(rings)
+        return self.status == "settled" and self.periods < least
+
+    def _rings(self, rings: float) -> bool:
+        after = self.periods - RINGING.start
+        if rings == 0.0 or after < 0 or after % RINGING.step:
+            return False
+        return STEADY[0] <= self.decay <= STEADY[1] and self.scatter <= rings
 
     @property
     def decay(self) -> float:

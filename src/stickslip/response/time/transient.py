@@ -51,6 +51,9 @@ class TimeStepping:
     every_harmonic
         Judge all reported harmonics except the mean, not the driven ones only: a motion over several periods of the
         load shows in the others.
+    rings
+        Relative scatter up to which a motion counts as periodic but for vibration that neither decays nor grows, such
+        as that of a damper on its contact springs; the integration then ends early, ``unsettled``. 0: never.
     """
 
     steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
@@ -59,6 +62,7 @@ class TimeStepping:
     harmonics: int = quantity("highest harmonic reported", default=7, least=1)
     min_periods: int = quantity("periods at least", default=1, least=1)
     every_harmonic: bool = False
+    rings: float = quantity("relative scatter, 1e-4 is usual", default=0.0, least=0, below=1)
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -211,7 +215,7 @@ def _settle(
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
     now = Progress(unknown, np.full(n, np.nan), judged=judged)
-    while now.periods < stepping.max_periods and now.goes_on(stepping.min_periods):
+    while now.periods < stepping.max_periods and now.goes_on(stepping.min_periods, stepping.rings):
         began = state.x[:n].copy()
         failed = marcher.march(state, record)
         if failed < 0 or overflowed(state.x, record.motion):

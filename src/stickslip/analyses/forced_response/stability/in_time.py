@@ -11,13 +11,16 @@ from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.stability.missing_harmonics import MOST_ROWS, with_more
 from stickslip.response.system import System
 from stickslip.response.time.sectors import all_sectors, sectors_in_time
 from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
+from stickslip.solve.line_search import NaturalLevel
 from stickslip.solve.newton_method import newton
 from stickslip.units import HZ, LARGEST_PERCENT, metres
 
@@ -174,12 +177,20 @@ APART = 10.0  # percent: a motion in time farther than this from every balance i
 KICK = 1e-3  # disturbance of velocities relative to their amplitude, for motions not known to be stable
 SHOWN = 1e3  # growth or decay of a disturbance that shows the stability
 RINGS = 1e-3  # largest scatter of a motion that is periodic except for undamped ringing
+RINGS_ON = (
+    2e-4  # scatter up to which an integration ends early if it neither decays nor grows; a fifth of the disturbance
+)
 DECAYS, GROWS = 0.5, 1.1  # change within the last third of an integration over the change within the third before
+GROWS_CLEARLY = 1.5  # the same for ringing within `RINGS_ON`, whose largest changes vary from third to third; 0.2 % a period over 200 periods
 MOST_TOLD = 10**6  # largest number of periods that is stated
 GOLDEN = 2.399963  # golden angle, rad: phases of all coordinates differ
 WHOLE = 41  # harmonics of an integration, if amplitudes are of the whole motion
 REPORTED = 7  # least harmonics of an integration
 FLOPS = 4e9  # operations of time integration a second
+STEP_FLOPS = 2e4  # operations that last as long as a step of the smallest system, 5 µs
+RAISED = (9, 15, 21, 31, 41)  # highest harmonics of a balance that starts from the motion in time
+RAISED_AGREE = 0.5  # its difference from that motion over the tolerated error
+RAISED_APART = 0.2  # its difference from the point as solved: two masses on stiff contacts, H = 5, 0.16; another motion is farther away
 MOST_STEPS = 8 * STEPS  # steps are doubled as long as this changes the motion by more than `LARGE`
 
 
@@ -191,7 +202,9 @@ def chosen(question: Question, response: Response) -> list[Accepted]:
     return sorted((response.top, *beside), key=lambda a: a.point.omega)
 
 
-def check_in_time(question: Question, response: Response, accepted: Accepted, multiplier: float | None = None) -> Check:
+def check_in_time(
+    question: Question, response: Response, accepted: Accepted, multiplier: float | None = None, *, raises: bool = False
+) -> tuple[Check, ForcedPoint | None]:
     """Integrate in time at a point of the response, and compare.
 
     Parameters
@@ -203,6 +216,13 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
     multiplier
         Modulus of the multiplier of a point not known to be stable, NaN if unknown. The motion then starts with disturbed velocities and is
         followed until the disturbance shows. None: without a disturbance.
+    raises
+        Whether a balance that differs from the motion in time is solved again from that motion, with more harmonics.
+
+    Returns
+    -------
+    tuple
+        The comparison, and the balance with more harmonics that it is about; None: it is about the point itself.
     """
     point = accepted.point
     after = 0 if multiplier is None else shows_after(multiplier)
@@ -216,6 +236,13 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
     check = _compared(question, response, point, found, STEPS)
     if found.settled and not abs(check.difference_percent) <= LARGE:
         check, found = _with_steps_enough(question, response, point, found, check)
+    limit = 100 * question.problem.strategy.threshold
+    if raises and _repeats(found) and not max(abs(check.difference_percent), check.outputs_percent) <= limit:
+        raised = balance_from_time(question, point, found, check.steps)
+        if raised is not None:
+            own = _compared(question, response, raised, found, check.steps)
+            own = replace(own, step_percent=check.step_percent, motion="attained", shows_after=after)
+            return own, replace(raised, predicted_error=own.outputs_percent / 100)
     known = _driven(question, _known(found)[:, response.output])
     balances = [_of_balance(question, response, point)]
     if not (abs(check.difference_percent) <= LARGE and _apart(balances[0], known) <= APART):
@@ -226,7 +253,67 @@ def check_in_time(question: Question, response: Response, accepted: Accepted, mu
             balances.append(_of_balance(question, response, better))
             check = replace(check, refined=_amplitude(question, response, better))
     motion = _motion(check, found, min(_apart(one, known) for one in balances))
-    return replace(check, motion=motion, shows_after=after)
+    return replace(check, motion=motion, shows_after=after), None
+
+
+def balance_from_time(
+    question: Question, point: ForcedPoint, found: TransientResult, steps: int = STEPS
+) -> ForcedPoint | None:
+    """Solve the balance again with more harmonics, from the motion in time.
+
+    Newton's method finds a balance with many harmonics from there where it does not from one with few: a stick-slip
+    motion on stiff contacts (1e5 times the structure's stiffness) has as many nearby solutions as it has short stops.
+
+    Parameters
+    ----------
+    question, point
+        The case, and the point whose balance differs from the motion in time.
+    found
+        The settled motion in time.
+    steps
+        Its time steps a period.
+
+    Returns
+    -------
+    ForcedPoint or None
+        The balance with the fewest harmonics of `RAISED` whose outputs differ from the motion in time by less than half
+        the tolerated error, phases included, else the nearest within that error; None if there is none, or if it is
+        another motion than the point.
+    """
+    problem, system = question.problem, question.model.system
+    highest = min(RAISED[-1], MOST_ROWS // (2 * system.retained.size))
+    if system.structure.wheel is not None or highest <= point.order:
+        return None
+    limit = problem.strategy.threshold
+    last = integrate(
+        one_structure(system.structure, "time integration"),
+        system.interface.gap_operator,
+        system.interface.laws,
+        question.model.load,
+        point.omega,
+        np.arange(system.structure.n),
+        start=found.final,
+        stepping=TimeStepping(steps_per_period=steps, max_periods=2, harmonics=highest),
+        weights=system.interface.weights,
+    )
+    best, nearest = None, limit
+    for order in (order for order in RAISED if point.order < order <= highest):
+        balance = problem.balance(harmonics_of(order))
+        start = balance.unknowns(last.harmonics[: order + 1, balance.linear.retained])
+        for level in (None, NaturalLevel()):
+            solution = newton(lambda x, b=balance: b.linearise(x, point.omega), start, problem.sweep.newton, level)  # type: ignore[misc]
+            if solution.status.converged:
+                break
+        else:
+            continue
+        more = with_more(point, balance.coefficients(solution.x), np.array(balance.harmonics), np.nan)
+        outputs = balance.linear.recover(point.omega, more.coefficients)[:, system.outputs]
+        apart = _of_outputs(problem, _known(found), outputs)
+        if apart <= nearest:
+            best, nearest = more, apart
+        if apart <= RAISED_AGREE * limit:
+            break
+    return best if best is not None and problem.real_error(point, best) <= RAISED_APART else None
 
 
 def shows_after(multiplier: float) -> int:
@@ -243,11 +330,19 @@ def shows_after(multiplier: float) -> int:
     return ceil(log(SHOWN) / rate) if rate > log(SHOWN) / MOST_TOLD else MOST_TOLD
 
 
-def seconds_in_time(system: System) -> float:
-    """Return the estimated time of an integration that does not settle, s, by the size of all integrated sectors."""
+def seconds_in_time(system: System, steps: int = PATIENCE * STEPS) -> float:
+    """Return the estimated time of an integration, s, by the size of all integrated sectors.
+
+    Parameters
+    ----------
+    system
+        The vibrating system.
+    steps
+        Number of time steps; left out: those of an integration that does not settle.
+    """
     sectors = sectors_in_time(system)
     rows, gaps = 2 * sectors * system.structure.n, 3 * sectors * system.interface.n_contacts
-    return PATIENCE * STEPS * (2.0 * rows**2 + float(gaps) ** 3) / FLOPS
+    return steps * (STEP_FLOPS + 2.0 * rows**2 + float(gaps) ** 3) / FLOPS
 
 
 def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
@@ -256,9 +351,16 @@ def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
         return "left"
     if not found.settled and found.scatter > RINGS:
         return "not settled" if found.decay < DECAYS else "not periodic"
-    if not found.settled and found.decay > GROWS:
+    if not _repeats(found):
         return "not settled"
     return "attained" if apart <= APART else "left"
+
+
+def _repeats(found: TransientResult) -> bool:
+    """Whether a motion in time is periodic, but for ringing that does not grow."""
+    if found.settled:
+        return True
+    return found.scatter <= RINGS and not found.decay > (GROWS_CLEARLY if found.scatter <= RINGS_ON else GROWS)
 
 
 def _apart(balance: ComplexArray, known: ComplexArray) -> float:
@@ -401,6 +503,7 @@ def integrated(
             steps_per_period=steps,
             max_periods=periods,
             min_periods=least,
+            rings=RINGS_ON,
             harmonics=max(REPORTED if problem.sweep.amplitude_of == "first" else WHOLE, *load.harmonics),
         ),
         weights=contacts.weights,

@@ -180,27 +180,38 @@ def as_note(examined: Examined) -> dict[str, Any]:
     note = asdict(replace(examined, raised=None))
     del note["raised"], note["multipliers"]
     note |= {"re": examined.multipliers.real, "im": examined.multipliers.imag}
-    more = examined.raised
-    if more is None:
-        return note
-    motion = {
-        "raised_re": more.coefficients.real,
-        "raised_im": more.coefficients.imag,
-        "raised_harmonics": more.harmonics,
-        "raised_error": more.predicted_error,
-    }
-    return note | motion
+    return note | note_of_raised(examined.raised)
 
 
 def from_note(note: Mapping[str, Any], point: ForcedPoint) -> Examined:
     """Return an examined point from a note of the job."""
-    apart = ("re", "im", "raised_re", "raised_im", "raised_harmonics", "raised_error")
-    own = Examined(**{name: value for name, value in note.items() if name not in apart})
-    own = replace(own, multipliers=_complex(note, ""))
+    own = Examined(**{name: value for name, value in without_raised(note).items() if name not in ("re", "im")})
+    return replace(own, multipliers=_complex(note, ""), raised=raised_of(note, point))
+
+
+def note_of_raised(raised: ForcedPoint | None) -> dict[str, Any]:
+    """Return the solution that replaces a point as part of a note of the job; empty if there is none."""
+    if raised is None:
+        return {}
+    return {
+        "raised_re": raised.coefficients.real,
+        "raised_im": raised.coefficients.imag,
+        "raised_harmonics": raised.harmonics,
+        "raised_error": raised.predicted_error,
+    }
+
+
+def without_raised(note: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a note of the job without the solution that replaces the point."""
+    return {name: value for name, value in note.items() if not name.startswith("raised_")}
+
+
+def raised_of(note: Mapping[str, Any], point: ForcedPoint) -> ForcedPoint | None:
+    """Return the solution that replaces a point from a note of the job; None if there is none."""
     if "raised_re" not in note:
-        return own
+        return None
     harmonics, error = np.asarray(note["raised_harmonics"]), float(note["raised_error"])
-    return replace(own, raised=with_more(point, _complex(note, "raised_"), harmonics, error))
+    return with_more(point, _complex(note, "raised_"), harmonics, error)
 
 
 def _complex(note: Mapping[str, Any], of: str) -> ComplexArray:

@@ -19,9 +19,12 @@ from stickslip.analyses.forced_response.stability.stable import (
     examine,
     from_note,
     integrable,
+    note_of_raised,
+    raised_of,
     to_integrate,
     with_motion,
     with_raised,
+    without_raised,
 )
 from stickslip.errors import InputError
 from stickslip.response.forced.problem import ForcedPoint
@@ -30,8 +33,9 @@ from stickslip.study.store.progress import LOG, stage
 from stickslip.units import HZ
 
 MOST_PEAKS = 3  # largest motions integrated in time, each after the larger one proved unstable
-MOST_DOUBTS = 20  # other motions integrated in time
-SECONDS_OF_DOUBTS = 120.0  # estimated seconds for all of them
+SECONDS_OF_DOUBTS = (
+    120.0  # estimated seconds of time integration, from its counted steps, for the other motions of a case
+)
 
 
 @dataclass(eq=False)
@@ -123,8 +127,8 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
         peak = with_stable_peak(response, found)
         if not to_integrate(question, peak, found) or peak.top is None:
             break
-        check = integrated(question, peak, peak.top, found, notes)
-        found = [with_motion(e, check) if e.position == peak.peak else e for e in found]
+        check, raised = integrated(question, peak, peak.top, found, notes, raises=True)
+        found = [_with_balance(with_motion(e, check), raised) if e.position == peak.peak else e for e in found]
     if question.examine in ("peak", "off") or not integrable(question):
         return found
     return _doubts_in_time(question, response, found, notes)
@@ -132,9 +136,8 @@ def _examined(question: Question, response: Response, notes: Notes, look: Looked
 
 def _doubts_in_time(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
     """Integrate in time at points left open by multipliers or predictions, the largest first, and pass confirmed stability on to neighbours."""
-    found, tried = examined, set[int]()
-    seconds = seconds_in_time(question.model.system)
-    for _ in range(min(MOST_DOUBTS, int(SECONDS_OF_DOUBTS / seconds))):
+    found, tried, spent = examined, set[int](), 0.0
+    while spent < SECONDS_OF_DOUBTS:
         open_ = _open_places(question, response, found) - tried
         if not open_:
             break
@@ -142,10 +145,11 @@ def _doubts_in_time(question: Question, response: Response, examined: list[Exami
         tried.add(place)
         own = response.accepted[place]
         try:
-            check = integrated(question, response, own, found, notes)
+            check, raised = integrated(question, response, own, found, notes, raises=True)
         except InputError:
             break  # the model cannot be integrated: doubts remain
-        found = [with_motion(e, check) if e.position == place else e for e in found]
+        spent += seconds_in_time(question.model.system, check.periods * check.steps)
+        found = [_with_balance(with_motion(e, check), raised) if e.position == place else e for e in found]
         found = neighbours_of(question, response, found, [own.point.omega] * (check.motion == "attained"))
     return found
 
@@ -163,19 +167,35 @@ def _open_places(question: Question, response: Response, examined: Sequence[Exam
     return undecided | ({*predicted} - unstable)
 
 
+def _with_balance(examined: Examined, raised: ForcedPoint | None) -> Examined:
+    """Return the stability with the balance that was solved again from the motion in time, if there is one."""
+    return examined if raised is None else replace(examined, raised=raised)
+
+
 def integrated(
-    question: Question, response: Response, accepted: Accepted, examined: Sequence[Examined], notes: Notes
-) -> Check:
-    """Integrate in time; results of an interrupted run are used again."""
+    question: Question,
+    response: Response,
+    accepted: Accepted,
+    examined: Sequence[Examined],
+    notes: Notes,
+    *,
+    raises: bool = False,
+) -> tuple[Check, ForcedPoint | None]:
+    """Integrate in time; results of an interrupted run are used again.
+
+    Return the comparison, and the balance with more harmonics that replaces the point; None if the point stays, as it
+    does unless `raises`.
+    """
     omega = accepted.point.omega
     name = f"{IN_TIME}.{omega!r}"
     known = notes.get(name)
     if known:
-        check = Check(**known)
+        check, raised = Check(**without_raised(known)), raised_of(known, accepted.point)
     else:
         stage(f"check in time: {omega / HZ:.2f} Hz")
         doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
-        check = check_in_time(question, response, accepted, *doubted)
-    notes.put(name, asdict(check))
+        raises = raises and question.sweep.auto and question.problem.strategy.verifies
+        check, raised = check_in_time(question, response, accepted, *doubted, raises=raises)
+    notes.put(name, asdict(check) | note_of_raised(raised))
     LOG.info(f"time integration: {question.said(check.sentence)}")
-    return check
+    return check, raised
