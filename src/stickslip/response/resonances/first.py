@@ -48,100 +48,6 @@ SAG = 0.02  # largest relative height of a peak above the neighbouring sweep poi
 STANDS_OUT = 1.01  # smallest ratio of a maximum to the higher one of the minima beside it
 
 
-def motions_of_several_periods(
-    system: System,
-    balance: HarmonicBalance,
-    omega_range: tuple[float, float],
-    periods: int,
-    points: int,
-    options: Newton,
-) -> list[Point]:
-    """Return motions that repeat after several load periods, over the frequency, in the order of their branch.
-
-    Parameters
-    ----------
-    system
-        System of `balance`.
-    balance
-        Balance at the lower frequency.
-    omega_range
-        Range of the lower frequency, rad/s.
-    periods
-        Load periods in one period of the motion.
-    points
-        Smallest number of steps through the range.
-    options
-        Corrector options.
-
-    Raises
-    ------
-    InputError
-        If no such motion is found.
-    """
-    first, last = omega_range
-    way = following_vibration(balance, steps_through(last - first, points), options)
-    for omega in np.linspace(first, last, FREQUENCIES + 2)[1:-1]:
-        for x in _motions(system, balance, float(omega), periods, options):
-            start = start_point(balance, x, float(omega), way)
-            if not start.solution.status.converged:
-                continue
-            up = _followed(balance, start, omega_range, last, way)
-            down = _followed(balance, reversed_point(start), omega_range, first, way)
-            return [*down[::-1], start, *up]
-    tries = FREQUENCIES * len(AMPLITUDES) * PHASES
-    raise input_error(
-        "omega_range",
-        f"holds no motion of {periods} periods that was found from {tries} starts, which proves that there is none as little as a march in time does",
-        "Give a narrower range, another value or a larger load; `bifurcations.subharmonic_branch` takes a start of your own.",
-    )
-
-
-def _motions(
-    system: System, balance: HarmonicBalance, omega: float, periods: int, options: Newton
-) -> Iterator[FloatArray]:
-    """Yield motions with a lowest harmonic at a frequency."""
-    plain = without_branch(system, balance, options, omega)
-    if not plain.status.converged:
-        return
-    n = balance.linear.n
-    own = slice(n, 3 * n)  # the lowest harmonic: cosine and sine parts
-    jac = balance.linearise(plain.x, omega).dense_jac()[own, own]
-    shape = np.linalg.svd(jac)[2][-1]
-    motion = (shape[:n] - 1j * shape[n:]) / np.linalg.norm(shape)
-    size = float(np.linalg.norm(plain.x[n:]))
-    for amplitude in AMPLITUDES:
-        for turn in np.arange(PHASES) * 2.0 * np.pi / (periods * PHASES):
-            added = amplitude * size * motion * np.exp(1j * turn)
-            guess = plain.x.copy()
-            guess[own] += np.concatenate([added.real, -added.imag])
-            found = newton(lambda v: balance.linearise(v, omega), guess, options)
-            if found.status.converged and _subharmonic(balance, found.x):
-                yield found.x
-
-
-def _subharmonic(balance: HarmonicBalance, x: FloatArray) -> bool:
-    n = balance.linear.n
-    return bool(np.linalg.norm(x[n : 3 * n]) > LEAST * np.linalg.norm(x[n:]))
-
-
-def _followed(
-    balance: HarmonicBalance, start: Point, omega_range: tuple[float, float], end: float, way: Following
-) -> list[Point]:
-    """Follow the branch until it leaves the range, closes or joins the period-one response."""
-    found: list[Point] = []
-    first, last = omega_range
-    beside = BESIDE * (last - first)
-    for point in trace(balance, start, end, way):
-        lost = not point.solution.status.converged or not _subharmonic(balance, point.x)
-        if lost or len(found) == POINTS or not first - beside < point.p < last + beside:
-            break
-        found.append(point)
-        near = np.linalg.norm(point.x - start.x) < CLOSED * np.linalg.norm(start.x)
-        if len(found) > FEW and near and abs(point.p - start.p) < CLOSED * (last - first):
-            break
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class PeakSearch:
     """Resonance to follow, and its defining condition.
@@ -392,3 +298,97 @@ def _near(problem: PeakProblem, points: list[Point], motions: ComplexArray, top:
     share = in_phase[i] / (in_phase[i] - in_phase[i + 1])
     a, b = points[i], points[i + 1]
     return a.x + share * (b.x - a.x), a.p + share * (b.p - a.p)
+
+
+def motions_of_several_periods(
+    system: System,
+    balance: HarmonicBalance,
+    omega_range: tuple[float, float],
+    periods: int,
+    points: int,
+    options: Newton,
+) -> list[Point]:
+    """Return motions that repeat after several load periods, over the frequency, in the order of their branch.
+
+    Parameters
+    ----------
+    system
+        System of `balance`.
+    balance
+        Balance at the lower frequency.
+    omega_range
+        Range of the lower frequency, rad/s.
+    periods
+        Load periods in one period of the motion.
+    points
+        Smallest number of steps through the range.
+    options
+        Corrector options.
+
+    Raises
+    ------
+    InputError
+        If no such motion is found.
+    """
+    first, last = omega_range
+    way = following_vibration(balance, steps_through(last - first, points), options)
+    for omega in np.linspace(first, last, FREQUENCIES + 2)[1:-1]:
+        for x in _motions(system, balance, float(omega), periods, options):
+            start = start_point(balance, x, float(omega), way)
+            if not start.solution.status.converged:
+                continue
+            up = _followed(balance, start, omega_range, last, way)
+            down = _followed(balance, reversed_point(start), omega_range, first, way)
+            return [*down[::-1], start, *up]
+    tries = FREQUENCIES * len(AMPLITUDES) * PHASES
+    raise input_error(
+        "omega_range",
+        f"holds no motion of {periods} periods that was found from {tries} starts, which proves that there is none as little as a march in time does",
+        "Give a narrower range, another value or a larger load; `bifurcations.subharmonic_branch` takes a start of your own.",
+    )
+
+
+def _motions(
+    system: System, balance: HarmonicBalance, omega: float, periods: int, options: Newton
+) -> Iterator[FloatArray]:
+    """Yield motions with a lowest harmonic at a frequency."""
+    plain = without_branch(system, balance, options, omega)
+    if not plain.status.converged:
+        return
+    n = balance.linear.n
+    own = slice(n, 3 * n)  # the lowest harmonic: cosine and sine parts
+    jac = balance.linearise(plain.x, omega).dense_jac()[own, own]
+    shape = np.linalg.svd(jac)[2][-1]
+    motion = (shape[:n] - 1j * shape[n:]) / np.linalg.norm(shape)
+    size = float(np.linalg.norm(plain.x[n:]))
+    for amplitude in AMPLITUDES:
+        for turn in np.arange(PHASES) * 2.0 * np.pi / (periods * PHASES):
+            added = amplitude * size * motion * np.exp(1j * turn)
+            guess = plain.x.copy()
+            guess[own] += np.concatenate([added.real, -added.imag])
+            found = newton(lambda v: balance.linearise(v, omega), guess, options)
+            if found.status.converged and _subharmonic(balance, found.x):
+                yield found.x
+
+
+def _subharmonic(balance: HarmonicBalance, x: FloatArray) -> bool:
+    n = balance.linear.n
+    return bool(np.linalg.norm(x[n : 3 * n]) > LEAST * np.linalg.norm(x[n:]))
+
+
+def _followed(
+    balance: HarmonicBalance, start: Point, omega_range: tuple[float, float], end: float, way: Following
+) -> list[Point]:
+    """Follow the branch until it leaves the range, closes or joins the period-one response."""
+    found: list[Point] = []
+    first, last = omega_range
+    beside = BESIDE * (last - first)
+    for point in trace(balance, start, end, way):
+        lost = not point.solution.status.converged or not _subharmonic(balance, point.x)
+        if lost or len(found) == POINTS or not first - beside < point.p < last + beside:
+            break
+        found.append(point)
+        near = np.linalg.norm(point.x - start.x) < CLOSED * np.linalg.norm(start.x)
+        if len(found) > FEW and near and abs(point.p - start.p) < CLOSED * (last - first):
+            break
+    return found
