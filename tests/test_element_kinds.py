@@ -44,6 +44,8 @@ def calculix(name):
 def split(mesh, how):
     """Divide the bricks of a box: into two wedges, or into six pyramids on their faces; `how` says which for each brick.
 
+    With tetrahedra outside the pyramids on faces along y and z are two tetrahedra each: faces of the box, if it has one brick across.
+
     Second-order cells get their mid-side nodes here, so that neighbours of all kinds share them.
     """
     points, cells = [*mesh.points], []
@@ -60,7 +62,7 @@ def split(mesh, how):
             faces = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
             for face in faces:
                 base = [n[i] for i in face]
-                if kind == "pyramids":
+                if kind == "pyramids" or (kind == "pyramids, tetrahedra outside" and face in (faces[3], faces[5])):
                     cells.append([*base, top])
                 else:  # the diagonal from the smallest node number: neighbours agree
                     base = base[(s := base.index(min(base))) :] + base[:s]
@@ -144,6 +146,42 @@ def test_uniform_strain_has_the_energy_of_hookes_law(body):
     inner = np.all((mesh.points > 1e-9) & (mesh.points < np.array(SIZE) - 1e-9), axis=1)
     assert inner.any()
     assert np.abs(force[inner]).max() < 1e-11 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("second", [False, True])
+def test_all_four_kinds_in_one_mesh_pass_the_patch_test(second):
+    how = ("hex", "pyramids, tetrahedra outside", "wedges", "hex", "pyramids, tetrahedra outside")
+    mesh = mesh_of(how, second, divisions=(5, 1, 1), wave=0.001, bend=0.0002)
+    assert len(by_kind(mesh.cells)) == 4
+    solid = assemble_solid(SolidMesh(mesh.points, mesh.cells, {}), STEEL)
+    gradient = np.random.default_rng(0).standard_normal((3, 3))
+    strain = (gradient + gradient.T) / 2
+    lame, shear = STEEL.lame
+    density = lame * np.trace(strain) ** 2 + 2 * shear * np.sum(strain**2)
+    u = (mesh.points @ gradient.T).ravel()
+    assert u @ (solid.stiffness @ u) == pytest.approx(density * VOLUME, rel=1e-11)
+    force = (solid.stiffness @ u).reshape(-1, 3)
+    inner = np.all((mesh.points > 1e-9) & (mesh.points < np.array(SIZE) - 1e-9), axis=1)
+    assert inner.any()
+    assert np.abs(force[inner]).max() < 1e-11 * np.abs(force).max()
+    squares = np.linalg.eigvalsh(solid.stiffness.toarray())
+    assert np.sum(np.abs(squares) < 1e-9 * squares[-1]) == 6
+
+
+def test_edges_of_both_orders_are_refused():
+    """A brick of 20 nodes beside two wedges of 6 would gape at four edges."""
+    first, second = (
+        mesh_of(("hex", "wedges"), divisions=(2, 1, 1)),
+        mesh_of(("hex", "wedges"), True, divisions=(2, 1, 1)),
+    )
+    cells = np.full((3, 20), -1)
+    cells[0] = second.cells[0]
+    cells[1:, :6] = second.cells[1:, :6]
+    used = np.unique(cells[cells >= 0])
+    own = np.where(cells >= 0, np.searchsorted(used, cells), -1)
+    assert len(first.cells) == 3
+    with pytest.raises(InputError, match="cells of first and second order share 4 edges"):
+        assemble_solid(SolidMesh(second.points[used], own, {}), STEEL)
 
 
 def test_rigid_motions_strain_nothing_and_carry_the_mass(body):

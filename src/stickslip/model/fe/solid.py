@@ -274,18 +274,35 @@ def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], Int
 
 def check_shared(mesh: SolidMesh) -> None:
     """Refuse edges of the same two corners with different mid-side nodes, and corners that are mid-side nodes."""
-    ends, middle, owners = [], [], []
+    ends, middle, owners, plain = [], [], [], []
     is_corner = np.zeros(len(mesh.points), dtype=bool)
     for width, rows in by_kind(mesh.cells):
         corners = CORNERS[width]
         is_corner[mesh.cells[rows, :corners]] = True
+        edges = np.sort(mesh.cells[rows][:, np.array(EDGES[corners])].reshape(-1, 2), axis=1)
         if width > corners:
-            own = mesh.cells[rows, :width]
-            ends.append(np.sort(own[:, np.array(EDGES[corners])].reshape(-1, 2), axis=1))
-            middle.append(own[:, corners:].ravel())
+            ends.append(edges)
+            middle.append(mesh.cells[rows, corners:width].ravel())
             owners.append(np.repeat(rows, width - corners))
+        else:
+            plain.append(edges)
     if ends:
+        if plain:
+            _check_orders(mesh, np.vstack(ends), np.vstack(plain))
         _check_middles(mesh, np.vstack(ends), np.concatenate(middle), np.concatenate(owners), is_corner)
+
+
+def _check_orders(mesh: SolidMesh, ends: IntArray, plain: IntArray) -> None:
+    """Refuse edges that cells of second order (e, 2) share with cells of first order (f, 2), where the mesh would gape."""
+    n = len(mesh.points)
+    both = np.intersect1d(ends[:, 0] * n + ends[:, 1], plain[:, 0] * n + plain[:, 1])
+    if both.size:
+        a, b = mesh.numbers[list(divmod(int(both[0]), n))]
+        raise input_error(
+            "mesh",
+            f"cells of first and second order share {both.size} edges, e.g. that of nodes {a} and {b}, whose mid-side node only one side has",
+            "Use cells of one order in each body, and tie bodies by [join].",
+        )
 
 
 def _check_middles(mesh: SolidMesh, ends: IntArray, middle: IntArray, owners: IntArray, is_corner: BoolArray) -> None:

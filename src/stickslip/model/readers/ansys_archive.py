@@ -23,6 +23,7 @@ from stickslip.model.readers.ansys_blocks import (
     is_whole,
     read_blocks,
 )
+from stickslip.model.readers.ansys_shapes import regular_nodes
 from stickslip.model.readers.units import Units, check_material
 
 COUPLED = ("coupled_1", "coupled_2")
@@ -70,21 +71,22 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     Returns
     -------
     SolidMesh
-        In metres, with the numbers of nodes and elements; node components are node sets in lower case, and ``coupled_1`` and
+        Bricks with repeated nodes are wedges, pyramids and tetrahedra. In metres, with the numbers of nodes and elements; node components are node sets in lower case, and ``coupled_1`` and
         ``coupled_2`` contain the first and the second nodes of coupled pairs (CP), as between the faces of a sector.
 
     Raises
     ------
     InputError
-        If the file is damaged; if elements are degenerate, lack mid-side nodes, have different shapes, or have stiffness
-        but are no solids.
+        If the file is damaged; if elements lack mid-side nodes, have repeated nodes in an unknown way, or have stiffness but are
+        no solids.
     """
     units = Units.si() if units is None else units
     path = Path(path)
     blocks = read_blocks(path)
     kept = _solids(path, blocks)
     cells = _cells(path, blocks, kept)
-    used = np.unique(cells)
+    own = cells >= 0
+    used = np.unique(cells[own])
     order = np.argsort(blocks.numbers, kind="stable")
     numbers = blocks.numbers[order]
     missing = np.setdiff1d(used, numbers)
@@ -95,7 +97,7 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     sets = {name: np.flatnonzero(np.isin(used, members)) for name, members in named.items()}
     return SolidMesh(
         units.length * points,
-        np.searchsorted(used, cells),
+        np.where(own, np.searchsorted(used, cells), -1),
         {name: members for name, members in sets.items() if len(members)},
         used,
         blocks.heads[kept, NUMBER],
@@ -265,23 +267,23 @@ def _solids(path: Path, blocks: Blocks) -> IntArray:
                 f"has {int((nodes > 0).sum())} nodes, regular are {' or '.join(map(str, allowed))}",
                 "Mesh with mid-side nodes in all places (EMID,ADD).",
             )
-        if len(np.unique(nodes)) < len(nodes):
-            raise input_error(
-                place,
-                "is degenerate: a prism, pyramid or tetrahedron written as a brick with repeated nodes",
-                "Mesh with bricks only, or with SOLID187: TCHG,186,187 changes degenerate tetrahedra.",
-            )
     return np.asarray(rows)
 
 
 def _cells(path: Path, blocks: Blocks, kept: IntArray) -> IntArray:
-    """Return the (m, k) node numbers of the solids in VTK order, which equals ANSYS's order for regular shapes."""
-    counts, often = np.unique([len(blocks.nodes[row]) for row in kept], return_counts=True)
-    if len(counts) > 1:
-        raise input_error(
-            str(path),
-            "has solids of different shapes: "
-            + ", ".join(f"{n} with {k} nodes" for k, n in zip(counts, often, strict=True)),
-            "A mesh holds one kind of cell: mesh all of it alike.",
-        )
-    return np.array([blocks.nodes[row] for row in kept])
+    """Return the (m, k) node numbers of the solids in VTK order; -1 fills the ends of shorter rows."""
+    found = []
+    for row in kept:
+        nodes = blocks.nodes[row]
+        cell = nodes if len(nodes) in (4, 10) else regular_nodes(nodes)
+        if cell is None or len(np.unique(cell)) < len(cell):
+            raise input_error(
+                f"{path}: element {blocks.heads[row, NUMBER]}, SOLID{blocks.types[int(blocks.heads[row, TYPE])]}",
+                "has repeated nodes that make it no wedge, pyramid or tetrahedron",
+                "Mesh this place anew.",
+            )
+        found.append(cell)
+    cells = np.full((len(found), max(map(len, found))), -1)
+    for i, cell in enumerate(found):
+        cells[i, : len(cell)] = cell
+    return cells

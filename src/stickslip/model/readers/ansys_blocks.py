@@ -1,6 +1,6 @@
 """ANSYS archives (``.cdb`` of ``CDWRITE``): nodes, elements, components and material properties, from text.
 
-Only blocked data are read (``NBLOCK``, ``EBLOCK``, ``CMBLOCK``, ``ET``, ``MPDATA``); all other commands are skipped, none is
+Only blocked data are read (``NBLOCK``, ``EBLOCK``, ``CMBLOCK``, ``ET``, ``ETBLOCK``, ``MPDATA``); all other commands are skipped, none is
 executed.
 """
 
@@ -96,6 +96,8 @@ def read_blocks(path: Path) -> Blocks:
             at = _element_block(path, lines, at, heads, corners)
         elif command == "CMBLOCK":
             at = _component(path, lines, at, sets)
+        elif command == "ETBLOCK":
+            at = _type_block(path, lines, at, types, commands)
         elif command == "ET" and len(words) > 2:
             types[_whole(path, at, words[1])] = _whole(path, at, words[2])
             place = f"{path}: line {at + 1}"
@@ -196,6 +198,33 @@ def _node_block(path: Path, lines: list[str], at: int) -> tuple[FloatArray, int]
     for i, row in enumerate(rest):
         table[i, 1 : 1 + len(row)] = row
     return table, end
+
+
+def _type_block(
+    path: Path, lines: list[str], at: int, types: dict[int, int], commands: list[tuple[str, list[str]]]
+) -> int:
+    """Read element types and their options, as ANSYS writes them since 2023 R1; return the line after the block.
+
+    Its format, ``(2i9,19a9)``, has the type's number, the element, and the options from KEYOPT(1) on.
+    """
+    text = lines[at + 1].strip().lower() if at + 1 < len(lines) else ""
+    found = re.fullmatch(r"\(2i(\d{1,2}),\d{0,2}a(\d{1,2})\)", text)
+    if not found or found[1] != found[2] or not int(found[1]):
+        raise input_error(f"{path}: line {at + 2}", f"{text[:40]!r} is no format such as (2i9,19a9)", CUT_SHORT)
+    first, end = at + 2, _block_end(lines, at + 2)
+    for line, row in enumerate(_fields(path, lines[first:end], first, int(found[1]), integer), first + 1):
+        if len(row) < 2:
+            raise input_error(f"{path}: line {line}", "a type of elements lacks its element", CUT_SHORT)
+        number, kind, *options = (int(value) for value in row)
+        types[number] = kind
+        commands += [
+            (f"{path}: line {line}", ["KEYOPT", str(number), str(k), str(value)])
+            for k, value in enumerate(options, 1)
+            if value
+        ]
+    if end >= len(lines) or lines[end].strip() != "-1":
+        raise input_error(f"{path}: line {end + 1}", "the block of element types has no end (-1)", CUT_SHORT)
+    return end + 1
 
 
 def _element_block(path: Path, lines: list[str], at: int, heads: list[list[int]], corners: list[IntArray]) -> int:
