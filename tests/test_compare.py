@@ -134,6 +134,28 @@ def test_each_case_is_drawn_for_the_designs_that_have_it(pair: Comparison) -> No
         pair.plot("compared_response")
 
 
+def test_many_curves_are_a_map_whose_colours_have_zero_in_their_middle() -> None:
+    """Nine laws at two loads each: peaks against the first design, in percent, on a scale that is as long above as below."""
+    keys = ["load.shaker.ratio", "contact.flat.law"]
+    rows = [(ratio, f"law {k}") for k in range(9) for ratio in (20.0, 5.0)]
+
+    def varied(factors: list[float]) -> ss.Result:
+        data = synthetic_result(ratios=[ratio for ratio, _ in rows], n=12).drop_vars(["vary", "vary_value"])
+        size = np.array(factors)
+        data["amplitude"] = data["amplitude"] * size[data["point_case"].values][:, None]
+        values = np.array(rows, dtype=object)
+        labels = [f"{keys[0]} = {r:g}, {keys[1]} = {law}" for r, law in rows]
+        data = data.assign(vary_value=(("case", "vary"), values), case_label=("case", labels))
+        return ss.Result(tree_of(forced_response=data.assign_coords(vary=keys)))
+
+    factors = [1.0, 0.9, 1.2, *[1.0] * 14, 0.7]
+    found = ss.compare(varied([1.0] * 18), varied(factors), names=("a", "b"))
+    (cells,) = found.plot("compared_optimisation").data
+    assert (list(cells.x), list(cells.y)) == (["5", "20"], [f"{keys[1]} = law {k}" for k in range(9)])
+    np.testing.assert_allclose(cells.z, 100.0 * (np.reshape(factors, (9, 2))[:, ::-1] - 1.0), atol=1e-9)
+    assert (cells.zmin, cells.zmax) == pytest.approx((-30.0, 30.0))
+
+
 def test_the_head_holds_best_against_best_and_names_each_case(pair: Comparison) -> None:
     head = cards(pair.designs, divided=True)
     labels = [card.label for card in head]

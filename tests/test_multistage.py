@@ -16,6 +16,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes
+from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.coupled_stages import Flange, circles, constraints, multistage, multistage_modes
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
@@ -172,6 +173,15 @@ def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
     np.testing.assert_allclose(data["stiffest_hz"].values[0], expected.stiffest_hz, rtol=1e-9)
     assert list(data["stage_name"].values) == ["front", "rear"]
     assert data["stage_sectors"].values.tolist() == [24, 18]
+    mass, moment = 0.0, 0.0  # of all sectors, about the origin, along the axis
+    for name, sectors in (("front", 24), ("rear", 18)):
+        deck, unit = read_deck(tmp_path / "study" / f"{name}.inp"), model.axis.unit
+        sector = assemble_solid(deck.mesh, *deck.materials.values(), clamped=())
+        moved = unit[["xyz".index(c) for c in sector.dofs.component]]
+        pushed = sectors * (sector.mass @ moved)
+        mass, moment = mass + moved @ pushed, moment + (moved * (sector.dofs.position @ unit)) @ pushed
+    assert data.attrs["mass_kg"] == pytest.approx(mass, rel=1e-9)
+    np.testing.assert_allclose(data.attrs["centre_m"], moment / mass * model.axis.unit, atol=1e-9)
     assert data["nodal_diameter"].values.tolist() == [2]
     assert result.conclusion == "Every answer is trusted."
     result.report(tmp_path / "report.html")
