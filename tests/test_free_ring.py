@@ -8,9 +8,11 @@ import pytest
 
 import stickslip as ss
 from stickslip.assembly import Model
+from stickslip.errors import StickslipError
 from stickslip.model.fe.free_solid import inertia_relief, rigid_motions
 from stickslip.model.part import solid_part
 from stickslip.model.readers.calculix_deck import read_deck
+from stickslip.model.readers.units import Units
 
 FREE = {
     0: [0, 0, 1536.218, 5732.688],
@@ -35,7 +37,7 @@ nodal_diameters = [0, 1, 2, 3]
 """
 
 
-def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3):
+def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3, tolerance=0.001):
     """Write the deck of a sector of a ring of 200 to 400 mm, 20 mm thick: 3 x 3 x 1 bricks; coordinates in mm with so many digits."""
     node = np.arange(2 * (cells + 1) ** 2).reshape(2, cells + 1, cells + 1) + 1  # axial, around, out
     lines = ["*NODE, NSET=NALL"]
@@ -53,7 +55,7 @@ def ring(path, digits, axis="z", *, along=False, sectors=12, cells=3):
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85e-9"]
     lines += ["*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL"]
     lines += ["*SURFACE, NAME=SLOW, TYPE=NODE", "LOW", "*SURFACE, NAME=SHIGH, TYPE=NODE", "HIGH"]
-    lines += ["*TIE, CYCLIC SYMMETRY, NAME=T, POSITION TOLERANCE=0.001", "SLOW, SHIGH"]
+    lines += [f"*TIE, CYCLIC SYMMETRY, NAME=T, POSITION TOLERANCE={tolerance}", "SLOW, SHIGH"]
     lines += [f"*CYCLIC SYMMETRY MODEL, N={sectors}, TIE=T", "0, 0, 0, " + ("0, 0, 1" if axis == "z" else "1, 0, 0")]
     if along:
         lines += ["*BOUNDARY", "HELD, 3" if axis == "z" else "HELD, 1"]
@@ -108,3 +110,21 @@ def tied(path):
         held=deck.held if deck.held.any() else None,
     )
     return part.solid, Model(parts={"ring": part}).neighbours.ties["ring"]
+
+
+def test_the_position_tolerance_of_the_deck_is_used(tmp_path):
+    """Five digits: faces match to 5e-3 mm, and frequencies are CalculiX's of exact ones to the digits of the coordinates."""
+    (tmp_path / "study.toml").write_text(STUDY)
+    ring(tmp_path / "ring.inp", 5)
+    with pytest.raises(StickslipError, match=r"6 of 8 nodes of 'cyclic_low'.*meet none of 'cyclic_high'"):
+        ss.Study.from_file(tmp_path / "study.toml").run()
+    ring(tmp_path / "ring.inp", 5, tolerance=0.01)
+    found = ss.Study.from_file(tmp_path / "study.toml").run()["modes"]
+    for wave, wanted in FREE.items():
+        np.testing.assert_allclose(
+            found.frequency_hz.values.squeeze()[wave][: len(wanted)], wanted, rtol=1e-4, atol=0.05
+        )
+    deck = read_deck(tmp_path / "ring.inp", units=Units.mm_t_s())
+    pairs = deck.axis.turned(deck.mesh.points[deck.mesh.node_sets["cyclic_low"]], 2 * np.pi / 12)
+    high = deck.mesh.points[deck.mesh.node_sets["cyclic_high"]]
+    assert max(np.linalg.norm(high - place, axis=1).min() for place in pairs) < 1e-15

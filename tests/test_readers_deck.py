@@ -151,6 +151,19 @@ def test_what_makes_an_element_another_is_told(tmp_path):
     assert told == "what makes C3D10M another element than its plain kind"
 
 
+def test_blank_and_missing_coordinates_are_zero(tmp_path):
+    """As in CalculiX and Abaqus."""
+    whole = deck_of(tmp_path, CUBE).mesh.points
+    text = (
+        CUBE.replace("\n1, 0., 0., 0.\n", "\n1,,,\n")
+        .replace("\n2, 1., 0., 0.\n", "\n2, 1.\n")
+        .replace("\n5, 0., 0., 1.\n", "\n5, , , 1.,\n")
+    )
+    assert text.count(",,") == 1
+    assert len(text) == len(CUBE) - 20
+    np.testing.assert_array_equal(deck_of(tmp_path, text).mesh.points, whole)
+
+
 def test_node_sets_of_elements(tmp_path):
     text = CUBE.split("*BOUNDARY", maxsplit=1)[0] + "*NSET, NSET=SKIN, ELSET=EALL\n"
     deck = deck_of(tmp_path, text)
@@ -339,7 +352,7 @@ def test_files_of_data_obey_the_rules_of_include(tmp_path):
     (tmp_path / "keyword.txt").write_text("*NODE\n1, 0., 0., 0.\n")
     with pytest.raises(InputError, match=r"keyword\.txt: line 1, \*NODE: is a keyword in a file of data"):
         deck_of(tmp_path, CUBE + "*NODE, INPUT=keyword.txt\n")
-    (tmp_path / "short.txt").write_text("1, 0.\n")
+    (tmp_path / "short.txt").write_text("1, 0., 0., 0., 0.\n")
     with pytest.raises(InputError, match=r"short\.txt: line 1: needs 4 numbers"):
         deck_of(tmp_path, CUBE + "*NODE, INPUT=short.txt\n")
 
@@ -352,7 +365,8 @@ def test_files_of_data_obey_the_rules_of_include(tmp_path):
         ("5, 6, 7, 8\n", "5, 6, 7, 8, 9\n", r"line 17: an element has 9 nodes, not 8"),
         ("5, 6, 7, 8\n", "5, 6, 7, 88\n", r"lacks 1 nodes, e\.g\. 88"),
         ("5, 6, 7, 8\n", "5, 6, 7, x8\n", "the node 'x8' is no whole number"),
-        ("6, 1., 0., 1.", "6, 1., 0.", r"line 11: needs 4 numbers, got 3"),
+        ("6, 1., 0., 1.", "6, 1., 0., 1., 2.", r"line 11: needs 4 numbers, got 5"),
+        ("6, 1., 0., 1.", ", 1., 0., 1.", r"line 11: '' is no finite number"),
         ("6, 1., 0., 1.", "6, 1., nan, 1.", r"line 11: 'nan' is no finite number"),
         ("99, 5., 5., 5.", "8, 5., 5., 5.", "defines node 8 twice"),
         ("8, 7,\n", "8, 77,\n", "there is no node 77"),

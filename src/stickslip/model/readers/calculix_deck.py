@@ -19,7 +19,7 @@ from stickslip.model.fe.elements import EXACT, Quadrature, Rules
 from stickslip.model.fe.solid import Material, integrate, node_dofs
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
-from stickslip.model.readers.keywords import Block, keyword_blocks, unique_in_order, whole_number
+from stickslip.model.readers.keywords import Block, keyword_blocks, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
 from stickslip.model.structure import Structure, nodal_dofs
@@ -69,6 +69,8 @@ def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) ->
         if model.tie is not None:
             raise input_error(block.place, "is a second cyclic tie", "Tie the faces of one sector.")
         model.tie = (low, high)
+        if block.parameters.get("POSITION TOLERANCE"):
+            model.reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
         if model.sectors is None:
             raise input_error(
                 block.place,
@@ -259,6 +261,7 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     if model.tie is not None and model.sectors:
         faces = _index(mesh, model.tie[0]), _index(mesh, model.tie[1])
         faces = _oriented(mesh.points, faces, axis, model.sectors)
+        mesh = _met(mesh, faces, axis, 2 * math.pi / model.sectors, units.length * model.reach)
         held = _held_by_tie(mesh, held, faces, axis, 2 * math.pi / model.sectors)
         sets |= {"cyclic_low": faces[0], "cyclic_high": faces[1]}
     root: BoolArray = held.min(axis=1)
@@ -426,6 +429,30 @@ def _oriented(
         for angle in (pitch, -pitch)
     ]
     return faces if misses[0] <= misses[1] else (faces[1], faces[0])
+
+
+def _met(mesh: SolidMesh, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float, reach: float) -> SolidMesh:
+    """Return the mesh with nodes of the low face moved to their partners, turned back, that lie within `reach`.
+
+    Files with few digits have faces that do not match exactly; the deck's POSITION TOLERANCE says what is rounding. Nodes on the axis
+    and nodes further away than `PAIRED` times the face stay.
+    """
+    from scipy.spatial import cKDTree
+
+    low, high = faces
+    if not (low.size and high.size):
+        return mesh
+    away, partner = cKDTree(mesh.points[high]).query(axis.turned(mesh.points[low], pitch))
+    size = float(np.ptp(mesh.points[high], axis=0).max())
+    moved = (
+        (away > 0) & (away <= min(reach, PAIRED * size)) & (np.linalg.norm(axis.arm(mesh.points[low]), axis=1) > reach)
+    )
+    moved &= ~np.isin(low, high)
+    if not moved.any() or np.unique(partner[moved]).size < np.count_nonzero(moved):
+        return mesh
+    points = mesh.points.copy()
+    points[low[moved]] = axis.turned(mesh.points[high[partner[moved]]], -pitch)
+    return replace(mesh, points=points)
 
 
 def _held_by_tie(

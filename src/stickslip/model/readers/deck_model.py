@@ -54,6 +54,7 @@ class DeckModel:
     axes: list[tuple[str, list[float], list[float]]] = field(default_factory=list)  # place, origin, direction
     sectors: int | None = None
     tie: tuple[IntArray, IntArray] | None = None  # nodes of the dependent and the independent face
+    reach: float = 0.0  # distance within which nodes of the tied faces meet
     ignored: list[str] = field(default_factory=list)
 
 

@@ -25,7 +25,7 @@ PARAMETERS: dict[str, frozenset[str]] = {
             ["NLGEOM"],
             ["NAME", "PERTURBATION", "INC", "INCF", "AMPLITUDE", "EXTRAPOLATION", "SOLVER", "UNSYMM", "CONVERT SDI"],
         ),
-        ("TIE", ["CYCLIC SYMMETRY"], ["NAME", "POSITION TOLERANCE", "ADJUST", "TYPE", "NO ROTATION", "NO THICKNESS"]),
+        ("TIE", ["CYCLIC SYMMETRY", "POSITION TOLERANCE"], ["NAME", "ADJUST", "TYPE", "NO ROTATION", "NO THICKNESS"]),
         ("CYCLIC SYMMETRY MODEL", ["N", "ELSET", "INPUT"], ["NGRAPH", "TIE", "CHECK"]),
         ("INSTANCE", ["NAME", "PART"], []),
         ("INITIAL CONDITIONS", ["TYPE"], ["INPUT", "USER", "FILE", "STEP", "INC", "INSTANCE"]),

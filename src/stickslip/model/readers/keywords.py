@@ -77,12 +77,15 @@ class Block:
                     fields = [part.strip(' \t"') for part in line.strip().rstrip(",").split(",")]
                     yield f"{segment.path}: line {number}", fields
 
-    def table(self, columns: int) -> FloatArray:
-        """Return the data lines as numbers (rows, columns), all with the same count."""
-        tables = [
-            number_table(s.path, _without_last_commas(s.text), columns, separator=",", first_line=s.first_line)
-            for s in self.segments
-        ]
+    def table(self, columns: int, *, blank_is_zero: bool = False) -> FloatArray:
+        """Return the data lines as numbers (rows, columns), all with the same count.
+
+        With `blank_is_zero` all fields but the first may be blank or left out, which means 0.
+        """
+        tables = []
+        for s in self.segments:
+            text = _filled(s.text, columns) if blank_is_zero else _without_last_commas(s.text)
+            tables.append(number_table(s.path, text, columns, separator=",", first_line=s.first_line))
         return np.vstack(tables) if tables else np.empty((0, columns))
 
 
@@ -189,6 +192,18 @@ def _listed(block: Block, sets: dict[str, list[IntArray]], known: IntArray) -> I
             if index == len(known) or known[index] != number:
                 raise input_error(place, f"there is no {what} {number}", "Define it, or take it out of the set.")
             yield np.array([number])
+
+
+def _filled(text: str, columns: int) -> str:
+    """Return lines of numbers with zeros for blank fields behind the first and for those left out."""
+    lines = text.splitlines()
+    for i, line in enumerate(lines):
+        if line.strip():
+            first, *rest = (part.strip() for part in line.split(","))
+            while len(rest) >= columns and not rest[-1]:  # commas at the end
+                rest.pop()
+            lines[i] = ",".join([first, *(part or "0" for part in rest), *["0"] * (columns - 1 - len(rest))])
+    return "\n".join(lines)
 
 
 def _without_last_commas(text: str) -> str:

@@ -120,7 +120,7 @@ def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
                 f"coordinates of SYSTEM={block.parameters['SYSTEM']} are not read",
                 "Write the nodes in Cartesian coordinates.",
             )
-        tables.append(block.table(4))
+        tables.append(block.table(4, blank_is_zero=True))
         if "NSET" in block.parameters:
             numbers = whole_numbers(path, tables[-1], ("node number",))[:, 0]
             named.setdefault(block.parameters["NSET"].upper(), []).append(numbers)
