@@ -1,21 +1,24 @@
 """Matrices that CalculiX stores with ``*FREQUENCY, SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof``."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import scipy
 
-from stickslip.arrays import IntArray, Matrix
+from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.entries import SYMMETRY, from_triangle
-from stickslip.model.readers.node_table import COMPONENTS
+from stickslip.model.readers.keywords import keyword_blocks
+from stickslip.model.readers.node_table import COMPONENTS, NodeTable
 from stickslip.model.readers.positions import doubt_about_positions, find_nodes
 from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, whole_numbers
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, check_units, in_si
-from stickslip.model.structure import Structure
+from stickslip.model.structure import Dofs, Structure
 
 MAX_NODE_DIGITS = 16  # largest number of digits of a node number: no program numbers further
+EXPANDED = re.compile(r"B\d|S\d|M3D|CP[SE]|CAX|T\d")  # element types that CalculiX makes solids of
 SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
 
 
@@ -46,7 +49,9 @@ def read_calculix_matrices(
     Returns
     -------
     Structure
-        Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. The matrices of a cyclic job are complex Hermitian:
+        Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. Nodes that CalculiX made of a beam's, a shell's or a plane
+        element's node are copies of it: copy 2 of node 12 is node 212 if all numbers are below 100. Their positions are unknown.
+        Incompatible modes of C3D8I bricks are coordinates ``mode``. The matrices of a cyclic job are complex Hermitian:
         they describe a travelling wave on the independent nodes of the cyclic tie.
 
     Raises
@@ -55,10 +60,14 @@ def read_calculix_matrices(
         If a file is missing, cut short or of another run, or positions are unknown.
     """
     stem = _stem(Path(path))
-    node, component = _read_dof(_find(stem, ".dof"))
-    n = len(node)
-    nodes = find_nodes(_deck(stem) if mesh is None else mesh, units)
-    dofs = nodes.dofs(node, component)
+    source = _deck(stem) if mesh is None else mesh
+    kinds = _element_types(source)
+    listed, component, copy = _read_dof(_find(stem, ".dof"), any(map(EXPANDED.match, kinds)))
+    n = len(listed)
+    nodes, node = _with_copies(find_nodes(source, units), listed, copy)
+    inner = (listed > nodes.numbers.max(initial=0)) & ("C3D8I" in kinds)
+    nodal = nodes.dofs(node[~inner], [c for c, i in zip(component, inner, strict=True) if not i])
+    dofs = _with_inner_modes(nodal, inner)
     stiffness = _read_matrix(_find(stem, ".sti"), n)
     inertia = _read_matrix(_find(stem, ".mas") if mass is None else Path(mass), n)
     if np.iscomplexobj(stiffness) != np.iscomplexobj(inertia):
@@ -116,23 +125,73 @@ def _deck(stem: Path) -> Path:
     )
 
 
-def _read_dof(path: Path) -> tuple[IntArray, list[str]]:
-    """Return node and component of each equation from lines ``node.direction``."""
+def _element_types(source: SolidMesh | Path | str) -> set[str]:
+    """Return the element types of a deck; none of other sources."""
+    if isinstance(source, SolidMesh) or ".inp" not in Path(source).suffixes[-2:]:
+        return set()
+    return {b.parameters.get("TYPE", "").upper() for b in keyword_blocks(Path(source)) if b.keyword == "ELEMENT"}
+
+
+def _read_dof(path: Path, expanded: bool) -> tuple[IntArray, list[str], IntArray]:
+    """Return node and component of each equation from lines ``node.direction``, and the copy of its node from 0 on.
+
+    CalculiX makes solids of beams, shells and plane elements and names each node that it makes like the node of the deck. With
+    `expanded` a dof that is named again begins a further copy of its node.
+    """
     text = read_text(path)
     _check_end(path, text)
-    nodes, components = [], []
+    nodes, components, copies = [], [], []
+    copy: dict[int, int] = {}
+    seen: set[tuple[int, int, str]] = set()
     for number, line in enumerate(text.splitlines(), 1):
         node, _, direction = line.strip().partition(".")
         if not (node.isdecimal() and len(node) < MAX_NODE_DIGITS and direction in {"1", "2", "3", "4", "5", "6"}):
             raise input_error(
                 f"{path}: line {number}", f"needs node.direction, got {line[:60]!r}", "Give the .dof file of CalculiX."
             )
-        nodes.append(int(node))
+        own = int(node)
+        if (own, copy.setdefault(own, 0), direction) in seen:
+            copy[own] += 1
+        seen.add((own, copy[own], direction))
+        nodes.append(own)
         components.append(COMPONENTS[int(direction) - 1])
-    pairs = set(zip(nodes, components, strict=True))
-    if not nodes or len(pairs) < len(nodes):
-        raise input_error(str(path), "names a dof twice, or none", "Give the .dof file of a single run.")
-    return np.array(nodes, dtype=np.int64), components
+        copies.append(copy[own])
+    if not nodes or (any(copies) and not expanded):
+        raise input_error(
+            str(path),
+            "names a dof twice, or none",
+            "Give the .dof file of a single run; of beams, shells or plane elements the deck that CalculiX ran, too.",
+        )
+    return np.array(nodes, dtype=np.int64), components, np.array(copies, dtype=np.int64)
+
+
+def _with_copies(nodes: NodeTable, listed: IntArray, copy: IntArray) -> tuple[NodeTable, IntArray]:
+    """Return the nodes with the copies that CalculiX made, and the node number (n,) of each equation.
+
+    Copy k of node 12 of a deck with numbers below 100 is node k12: 112, 212. Sets hold all copies; the position of a node with copies
+    is unknown.
+    """
+    step = 10 ** len(str(max(int(listed.max()), int(nodes.numbers.max(initial=0)))))
+    node = listed + step * copy
+    made = np.unique(node[copy > 0])
+    if not made.size:
+        return nodes, node
+    doubled = np.isin(nodes.numbers, made % step)
+    numbers = np.concatenate([nodes.numbers, made])
+    points = np.vstack([np.where(doubled[:, None], np.nan, nodes.points), np.full((len(made), 3), np.nan)])
+    sets = {name: np.concatenate([own, made[np.isin(made % step, own)]]) for name, own in nodes.node_sets.items()}
+    order = np.argsort(numbers)
+    return NodeTable(numbers[order], points[order], sets, nodes.place), node
+
+
+def _with_inner_modes(nodal: Dofs, inner: BoolArray) -> Dofs:
+    """Return the table of dofs with a mode for each equation of `inner` (n,): the incompatible modes of C3D8I."""
+    if not inner.any():
+        return nodal
+    node, position = np.full(len(inner), -1), np.full((len(inner), 3), np.nan)
+    node[~inner], position[~inner] = nodal.node, nodal.position
+    names = iter(nodal.component)
+    return Dofs(node, tuple("mode" if i else next(names) for i in inner), position)
 
 
 def _check_end(path: Path, text: str) -> None:
