@@ -687,3 +687,14 @@ def test_each_globalisation_acts_where_full_newton_steps_fail(tmp_path: Path) ->
     for data in found.values():
         motion = data.output_displacement.values[0, ..., 0] + 1j * data.output_displacement.values[0, ..., 1]
         assert np.abs(motion - answer.outputs).max() <= allowed("outputs", answer, answer)
+
+
+def test_a_repeat_without_a_solution_is_told_without_the_remedy_of_a_sweep() -> None:
+    system, load = lifting()
+    sweep = Sweep(omega_range=(0.6, 0.8), low=1, high=1, points=2, samples=64)
+    lost = replace(next(iter(forced_response(system, load, sweep))), status=Status.TOO_MANY_ITERATIONS)
+    _, point = analysis_module.progress(replace(lost, stage="point"), sweep)
+    _, again = analysis_module.progress(replace(lost, stage="settled"), sweep)
+    assert point.endswith(Status.TOO_MANY_ITERATIONS.advice)
+    assert again.startswith("more harmonics for a doubted point, point 1: ")
+    assert again.endswith(", no solution")

@@ -17,6 +17,7 @@ from stickslip.analyses.forced_response.verdicts.working_range import (
     ContactsAtPeak,
     CurvePeak,
     contacts_at_peak,
+    range_line,
     range_lines,
     range_sentences,
     regimes_of,
@@ -163,6 +164,11 @@ def test_without_a_stuck_case_the_range_is_that_around_the_smallest_peak() -> No
     assert stuck.startswith("At no value do all contacts stick at the peak; ")
     assert "within 3 dB of the smallest one, at 10" in works
     assert other.startswith("The other end was not reached: at 5, the last value, ")
+    assert range_line(own).startswith("friction works from 20 to 5 (within 3 dB of the smallest peak), ")
+    stuck_end = replace(peaks[0], contacts=STICKS)
+    known = working_range((stuck_end, *peaks[1:]), "load.shaker.ratio")
+    assert known is not None
+    assert range_line(known).startswith("friction works from 20 to 5 (3 dB below the stuck system's peak), ")
 
 
 def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:

@@ -290,7 +290,8 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
         shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
     shares["check"] = shares["peak"]
     begin, width = shares.get(point.stage, (0.0, 0.95))
-    state = "" if point.converged else f", {point.status.advice}"
+    lost = ", no solution" if point.stage in REPEATED else f", {point.status.advice}"
+    state = "" if point.converged else lost
     marched = marched_of(point)
     state += "" if marched is None else f", {marched}"
     return (
@@ -304,6 +305,13 @@ def _values(solved: Solved) -> Values:
     return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
 
 
+REPEATED: tuple[Stage, ...] = (
+    "audit",
+    "trial",
+    "check",
+    "settled",
+    "compared",
+)  # solutions of points that stand without them
 IN_WORDS: dict[Stage, str] = {
     "low": "low harmonics",
     "high": "more harmonics",
@@ -315,8 +323,8 @@ IN_WORDS: dict[Stage, str] = {
     "found": "passage",
     "check": "harmonics of the peak",
     "in_time": "start in time",
-    "settled": "harmonics settled",
-    "compared": "harmonics compared",
+    "settled": "more harmonics for a doubted point",
+    "compared": "a doubted point compared with more harmonics",
 }
 
 FORCED_RESPONSE = Analysis(

@@ -322,7 +322,8 @@ def range_line(own: WorkingRange) -> str:
     if not own.judged:
         return f"cannot be told from these values of {own.word}"
     works = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
-    told = [f"friction works {works}" if works else f"friction works at no {own.word}"]
+    by = "within 3 dB of the smallest peak" if own.stuck is None else "3 dB below the stuck system's peak"
+    told = [f"friction works {works} ({by})" if works else f"friction works at no {own.word}"]
     told.append(f"the {_size(own)} is smallest at {_value(own, own.smallest)}")
     if own.stuck is not None:
         told.append(f"all contacts stick {'from' if own.falling else 'up to'} {_value(own, own.stuck)}")
