@@ -184,6 +184,33 @@ def test_other_motions_are_told_unless_they_are_unstable(monkeypatch: pytest.Mon
     )
 
 
+def test_motions_on_the_branch_itself_are_no_other_motions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within 0.5 % of the frequency and 3 % of the amplitude of a point that was solved, such as beyond a fold."""
+
+    def other(hertz: float, amplitude: float) -> Any:
+        return SimpleNamespace(point=SimpleNamespace(omega=hertz * HZ), amplitude=amplitude, known=1.0, start="rest")
+
+    def accepted(hertz: float, amplitude: float, fields: object = 0) -> Any:
+        return SimpleNamespace(point=SimpleNamespace(omega=hertz * HZ), size=amplitude, fields=fields)
+
+    beside = [(100.4, 2.05), (100.6, 2.0), (100.0, 2.07), (99.6, 1.95), (100.0, 1.93), (50.0, 1.0)]
+    monkeypatch.setattr(elsewhere, "other_motions", lambda *_: [other(*each) for each in beside])
+    monkeypatch.setattr(elsewhere, "_stability", lambda *_: "stable")
+    response: Any = SimpleNamespace(
+        top=SimpleNamespace(point=SimpleNamespace(converged=True)),
+        flanks=(),
+        solved=(),
+        output=0,
+        accepted=(accepted(100.0, 2.0), accepted(50.0, 1.0, None)),
+        amplitude=lambda a: a.size,
+    )
+    check(
+        elsewhere.motions_elsewhere(SimpleNamespace(problem=None), response),  # type: ignore[arg-type]
+        another_frequency_hz=[100.6, 100.0, 100.0, 50.0],
+        another_amplitude=[2.0, 2.07, 1.93, 1.0],
+    )
+
+
 def test_changes_of_the_peak_with_more_modes_and_fewer_points(monkeypatch: pytest.MonkeyPatch) -> None:
     def at(amplitude: float, hertz: float) -> Any:
         return SimpleNamespace(amplitude=lambda *_: amplitude), SimpleNamespace(omega=hertz * HZ)
