@@ -59,7 +59,7 @@ class Model(Assembly):
 
     def assembled(self, harmonics: int, *, every_wave: bool = False) -> Assembled:
         """Return the assembled model, the input of the lower layers; see `assemble` of `stickslip.assembly`."""
-        return assemble(self, harmonics, every_wave=every_wave)
+        return assemble(self, harmonics, every_wave=every_wave, linear=True)
 
     def forced_response(
         self,

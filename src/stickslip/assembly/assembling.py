@@ -10,7 +10,7 @@ from stickslip.assembly.forces import refuse_second
 from stickslip.assembly.model import Model
 from stickslip.assembly.part_reduction import Store, in_memory
 from stickslip.assembly.sides.mistuned import assemble_mistuned
-from stickslip.errors import StickslipError
+from stickslip.errors import StickslipError, input_error
 from stickslip.model.part import Part
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
@@ -21,7 +21,13 @@ REMEMBERED_AS = "with more modes"
 
 
 def assemble(
-    model: Model, harmonics: int, store: Store = in_memory, *, wave_number: int | None = None, every_wave: bool = False
+    model: Model,
+    harmonics: int,
+    store: Store = in_memory,
+    *,
+    wave_number: int | None = None,
+    every_wave: bool = False,
+    linear: bool = False,
 ) -> Assembled:
     """Reduce the parts of a model, join them, pair the contacts, and apply the static loads.
 
@@ -39,6 +45,8 @@ def assemble(
         loads.
     every_wave
         Whether all waves of a wheel are reduced, as for stability against every wave.
+    linear
+        Whether a model may have no contact; its outputs are then the unknowns.
 
     Raises
     ------
@@ -49,6 +57,12 @@ def assemble(
     """
     if wave_number is not None:
         model = model.undriven
+    if not (linear or model.pairs.names):
+        raise input_error(
+            "contact",
+            "there is none, and this analysis is about contacts",
+            "Give a contact, or ask for [forced_response] or [modes].",
+        )
     refuse_second(model.loads)
     if model.mistuning is not None:
         return assemble_mistuned(model, harmonics, store)

@@ -352,14 +352,15 @@ def frequencies(model: Model, linear: Linear, springs: FloatArray, order: int | 
     stuck = with_springs(reduced, gaps, springs)
     moving = [int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)]
     count = min(MODES, moving[0], max(moving[1] - held_gaps(model, gaps), 1))
-    hows: tuple[Literal["open", "stuck"], ...] = ("open", "stuck")
+    touching = bool(model.pairs.names)
+    hows: tuple[Literal["open", "stuck"], ...] = ("open", "stuck") if touching else ("open",)
     full = [partial(model.at, model.speed, number, how) for how in hows]
     found = []
     for how, at in zip(hows, full, strict=True):
-        told = f"{count} natural frequencies of the full model, contacts {how}, {model.places.n} dofs"
-        with step(told, model.places.n):
+        state = f", contacts {how}" * touching
+        with step(f"{count} natural frequencies of the full model{state}, {model.places.n} dofs", model.places.n):
             found.append(_lowest(model, at(), count, store))
-    return Frequencies(found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count))
+    return Frequencies(found[0], natural_frequencies(free, count), found[-1], natural_frequencies(stuck, count))
 
 
 def _without(structure: Structure, dofs: IntArray) -> Structure:

@@ -70,8 +70,6 @@ def asked(model: Model, harmonics: int) -> Asked:
     points = contact_labels(model)
     names = error_names(labels, points, model.loads, model.alert_over)
     watched = _joined(labels, points, _body_labels(model)).of(names, "alert_over")
-    if not model.pairs.names:
-        raise input_error("contact", "there is none: no coordinate would be left to solve for", "Give a contact.")
     refuse_rigid(model)
     refuse_unheld(model)
     refuse_pulled(model, static_forces(model, forces))

@@ -68,10 +68,10 @@ class System:
 
     @property
     def retained(self) -> IntArray:
-        """Sorted unknown dofs: of contacts, free bodies and constraints; with rigid contacts also the outputs."""
+        """Sorted unknown dofs: of contacts, free bodies and constraints; with rigid or without contacts also the outputs."""
         free = NO_DOFS if self.free is None else self.free
         held = np.union1d(free, self.structure.multipliers).astype(np.int64)
-        if self.interface.rigid:  # if all of them stick, contacts cannot measure a motion
+        if self.interface.rigid or not self.interface.n_contacts:  # stuck contacts, or none, cannot measure a motion
             held = np.union1d(held, self.outputs)
         return np.union1d(self.interface.coordinates(), held)
 

@@ -107,7 +107,7 @@ def of_pressures(case: Case, model: Model) -> tuple[str, ...]:
 
 
 def beside_the_range(question: Question) -> list[str]:
-    """Return the natural frequencies below, in and above the range of the sweep, contacts open and stuck."""
+    """Return the natural frequencies below, in and above the range of the sweep, contacts open and stuck, if there are any."""
     times = question.driven[0]
     lowest, highest = (times * omega / HZ for omega in question.sweep.omega_range)
     known, told = question.model.frequencies, []
@@ -115,7 +115,8 @@ def beside_the_range(question: Question) -> list[str]:
         told.append(
             f"{question.driven_names[0]} acts at {times} times the swept frequencies: {lowest:.2f} to {highest:.2f} Hz"
         )
-    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
+    both = ((", contacts open", known.free_reduced), (", contacts stuck", known.stuck_reduced))
+    for state, hertz in both if question.model.contacts.names else (("", known.free_reduced),):
         rigid = int(np.count_nonzero(hertz < RIGID))
         elastic = hertz[rigid:]
         pieces = [f"{rigid} of rigid motions"] * bool(rigid)
@@ -124,7 +125,7 @@ def beside_the_range(question: Question) -> list[str]:
             "none in the range"
         ]
         pieces += _listed(elastic[elastic > highest][:1], "above")
-        told += [f"natural frequencies, contacts {state}: {', '.join(pieces)}"] * bool(hertz.size)
+        told += [f"natural frequencies{state}: {', '.join(pieces)}"] * bool(hertz.size)
     return told
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
+from stickslip.assembly.forces import output_labels
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import kept_whole
 from stickslip.harmonic.harmonic_set import named
@@ -172,7 +173,12 @@ def nodes_of(model: Model) -> int:
 
 
 def retained_of(model: Model) -> int:
-    """Return the number of retained coordinates: free rigid bodies, and contact dofs or contact motions if these are fewer."""
+    """Return the number of retained coordinates: free rigid bodies, and contact dofs or contact motions if these are fewer.
+
+    Without contacts the outputs are retained.
+    """
+    if not model.pairs.names:
+        return int(output_labels(model.places, model.outputs, model.loads).dofs.size)
     bodies = np.zeros(model.places.n, dtype=bool)
     bodies[model.places.bodies()] = True
     both = scipy.sparse.hstack([model.pairs.own, model.pairs.following], format="csr")

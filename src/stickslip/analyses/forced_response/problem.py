@@ -307,11 +307,11 @@ def question_of(case: Case, model: Model) -> Question:
     harmonics = JUDGED_MULTIPLE * sweep.high_harmonics[-1]
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # to excite all waves of a wheel
-    assembled = assemble(model, harmonics, case.store)
+    assembled = assemble(model, harmonics, case.store, linear=True)
     asked = settings.forced_response
     examined = asked.stability != "off" or asked.bifurcations in ("all", "branches")
     if examined and examines_every_wave(assembled.system):
-        assembled = assemble(model, harmonics, case.store, every_wave=True)
+        assembled = assemble(model, harmonics, case.store, every_wave=True, linear=True)
     if IN_TIME in case.checks:
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:

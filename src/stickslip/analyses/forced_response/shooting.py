@@ -93,6 +93,12 @@ def require_shooting(settings: Any, model: Model, checks: frozenset[str]) -> Non
                 f"Remove it, or {BALANCE}.",
             )
     refuse_whole(METHOD, model, BALANCE)
+    _refuse_for_model(model)
+
+
+def _refuse_for_model(model: Model) -> None:
+    if not model.pairs.names:
+        raise input_error(METHOD, "is shooting, and the model has no contact", f"Give a contact, or {BALANCE}.")
     for name, part in model.parts.items():
         if part.sectors > 1:
             raise input_error(

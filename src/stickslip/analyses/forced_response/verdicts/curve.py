@@ -108,8 +108,8 @@ def stored_energy(gap: FloatArray | ComplexArray, force: FloatArray | ComplexArr
     gap, force
         (point, harmonic from 1, contact, ...) coefficients, m and N.
     """
-    own = [np.moveaxis(x, 2, 1).reshape(*x.shape[:1], x.shape[2], -1) for x in (gap, force)]
-    sizes = [np.linalg.norm(x, axis=2) for x in own]
+    own = [np.moveaxis(x, 2, 1) for x in (gap, force)]
+    sizes = [np.sqrt(np.sum(np.abs(x) ** 2, axis=tuple(range(2, x.ndim)))) for x in own]
     each = np.sum(sizes[0] * sizes[1], axis=1)
     return float(np.pi * np.nanmax(each, initial=0.0))
 
