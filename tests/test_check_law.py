@@ -133,6 +133,29 @@ def test_wrong_laws_are_told_where():
         check_law(_Coupled(pairs=3, n_state=1))
 
 
+def test_a_law_without_a_member_is_told_so():
+    @dataclass(frozen=True)
+    class Half:
+        pairs: int = 5
+
+    with pytest.raises(InputError, match=r"is a Half, which has no .*stuck_stiffness"):
+        check_law(Half())  # type: ignore[arg-type]
+
+
+def test_a_run_doubts_a_law_of_ones_own_that_is_inconsistent():
+    body = ss.model.lumped(np.eye(1), 0.02 * np.eye(1), np.eye(1), names=("a",))
+    model = ss.Model(
+        parts={"p": ss.Part(structure=body)},
+        contacts={"c": ss.Contact(between=("p.a", "ground"), law=_Wrong(), acts="tangential")},
+        loads={"f": ss.Load(on="p.a", newton=0.01)},
+        outputs=(ss.Output(name="a", on="p.a"),),
+    )
+    found = model.forced_response(hz=(0.1, 0.3), points=6, high=3, stability="off")
+    (told,) = [v.why for v in found.verdicts if "inconsistent" in v.why]
+    assert "the law _Wrong is inconsistent: jac[0, 0], force[0] by displacement[0], is 1," in told
+    assert found.conclusion.startswith("Not to be trusted")
+
+
 @pytest.mark.parametrize("preload", [10.0, -5.0])
 def test_a_pressure_that_grows_as_the_bodies_part_is_told_with_numbers(preload):
     numbers = {"k_t": 2e6, "k_w": 1e6, "k_n": 3e6, "mu": 0.4, "preload": preload}

@@ -193,6 +193,15 @@ def test_parts_of_unlike_units_are_told() -> None:
     assert not unlike_units({"a": parts["a"], "b": parts["a"]})
 
 
+@pytest.mark.parametrize(("length", "told"), [(19.9, False), (20.1, True), (100.0, True)])
+def test_a_part_whose_mm_are_read_as_m_is_told(length: float, told: bool) -> None:
+    mesh = bar((1, 1, 1), length=0.1)
+    size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    large = replace(mesh, points=length / size * mesh.points)
+    found = unlike_units({"blade": solid_part(large, Material())})
+    assert found == [f"part.blade measures {length:.3g} m from corner to corner: are its coordinates in mm?"] * told
+
+
 @pytest.mark.parametrize("share", [5e-7, 1e-9])
 def test_a_faint_excitation_is_measured_as_a_whole(share):
     # 16 dofs share the force: each has a quarter of its norm; the damper sticks, so that the response is linear

@@ -1,6 +1,6 @@
 """How a peak depends on the stiffness of its contacts: closed forms, differences of solutions, and what a result says."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -70,7 +70,9 @@ def test_the_slope_at_a_frequency_is_that_of_two_solutions(law):
         for step in (STEP, STEP / 2):
             ends = []
             for factor in (1.0 + step, 1.0 - step):
-                own = replace(system, interface=stiffer(system.interface, factor))
+                interface = stiffer(system.interface, factor)
+                assert interface is not None
+                own = replace(system, interface=interface)
                 _, other, at, amplitude, _ = solved(own, load, omega, sweep, motion)
                 ends.append(amplitude)
                 off = unknowns_bound(at, other.linearise(at, omega)) * other.displacement_scale
@@ -111,10 +113,35 @@ def test_contacts_that_are_stiffer_keep_friction_preload_and_gaps():
         ElasticCoulomb(k_t=1.0, k_w=2.0, k_n=3.0, mu=0.4, preload=-6.0),
         UnilateralSpring(k_n=4.0, initial_gap=1e-3),
     )
-    twice = stiffer(Interface(("a", "b", "c"), laws, np.zeros((9, 1))), 2.0).laws
+    made = stiffer(Interface(("a", "b", "c"), laws, np.zeros((9, 1))), 2.0)
+    assert made is not None
+    twice = made.laws
     assert twice[0] == ElasticCoulomb(k_t=2.0, k_w=4.0, k_n=6.0, mu=0.4, preload=2.0)
     assert twice[1] == ElasticCoulomb(k_t=2.0, k_w=4.0, k_n=6.0, mu=0.4, preload=-12.0)
     assert twice[2] == UnilateralSpring(k_n=8.0, initial_gap=1e-3)
+
+
+@dataclass(frozen=True)
+class TwoSliders(Jenkins):
+    """A law of one's own whose stiffnesses have other names; only its fields and its stuck stiffness are read here."""
+
+    k_1: float = 2.0
+    k_2: int = 3
+    share: float = 0.5
+    along_n: tuple[float, ...] = (4.0, 5.0)
+    squared: float = 0.0
+
+    def stuck_stiffness(self):
+        return np.array([self.k_t + self.k_1 + self.k_2 + self.squared**2, 0.0, self.along_n[0]])
+
+
+def test_stiffnesses_of_a_law_of_ones_own_are_those_its_stuck_stiffness_follows():
+    law = TwoSliders(k_t=1.0, limit=7.0)
+    made = stiffer(Interface(("a",), (law,), np.zeros((3, 1))), 1.5)
+    assert made is not None
+    assert made.laws == (replace(law, k_t=1.5, k_1=3.0, k_2=4.5, along_n=(6.0, 7.5)),)
+    unknown = replace(law, squared=2.0)  # the stuck stiffness follows it by its square
+    assert stiffer(Interface(("a", "b"), (law, unknown), np.zeros((6, 1))), 1.5) is None
 
 
 def peak_of(k):

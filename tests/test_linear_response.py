@@ -71,6 +71,28 @@ def test_shooting_needs_a_contact() -> None:
         two_masses().forced_response(hz=(0.1, 0.35), points=8, method="shooting")
 
 
+def test_steps_as_wide_as_a_resonance_are_doubted() -> None:
+    """Two light masses on equal springs, weakly coupled; the smaller of two narrow resonances is met, the larger is not."""
+    stiffness = np.array([[1.0, -0.05], [-0.05, 1.0]]) * (2.0 * np.pi) ** 2
+    damping = 2.0 * 5e-4 * 2.0 * np.pi * np.diag([1.0, 1.0])
+    body = ss.model.lumped(np.eye(2), stiffness, damping, names=("a", "b"))
+    model = ss.Model(
+        parts={"p": ss.Part(structure=body)},
+        loads={"f": ss.Load(on="p.a", newton=1.0), "g": ss.Load(on="p.b", newton=0.4)},
+        outputs=(ss.Output(name="a", on="p.a"),),
+    )
+    low, high = np.sqrt(np.linalg.eigvalsh(stiffness)) / (2.0 * np.pi)
+    span = (high - 0.11, high + 0.11)  # the larger peak, of the masses in phase, lies between two of 9 steps
+    found = {n: model.forced_response(hz=span, frequencies=n, peak_points=6) for n in (9, 1001)}
+    peaks = {n: float(one["forced_response"].peak_frequency_hz[0]) for n, one in found.items()}
+    assert peaks[1001] == pytest.approx(low, abs=1e-3)
+    assert "Every answer is trusted." in found[1001].conclusion
+    assert "Not to be trusted" in found[9].conclusion
+    (told,) = [v for v in found[9].verdicts if "wide at half power" in v.why]
+    assert told.level == "doubtful"
+    assert "a larger one may stand between them" in told.why
+
+
 WHEEL = """schema_version = 2
 [part.wheel]
 shape = "lumped"

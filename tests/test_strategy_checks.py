@@ -71,6 +71,16 @@ def test_what_cannot_be_asked_is_refused_at_once(wrong, message):
         ),
         (Verdict(float("inf"), None, (0, 1)), r"Own\.judge: returned the indicator inf"),
         (Verdict("loud", None, (0, 1)), r"Own\.judge: returned the indicator 'loud'"),
+        (
+            Verdict(1.0, 3, (0, 1)),
+            r"Own\.judge: returned again = 3\. Return a tuple of harmonics, .* or None: accepted\.",
+        ),
+        (Verdict(1.0, np.ones((2, 2), bool), (0, 1)), r"returned again = an array of shape \(2, 2\)\. Return a tuple"),
+        (Verdict(0.0, None, None), r"Own\.judge: returned following = None\. Return a tuple of harmonics, such as \(0"),
+        (
+            Verdict(1.0, (0, 1, 3), (0, 1), np.zeros(3)),
+            r"returned start = an array of shape \(3,\)\. Return an array of",
+        ),
         (Verdict(1.0, (0, 1, 9), (0, 1)), "asks for harmonics 9, which the reference does not"),
         (Verdict(0.0, None, (0, 1, 7)), "asks for harmonics 7, which the reference does not"),
     ],

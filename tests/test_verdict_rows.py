@@ -13,6 +13,7 @@ from stickslip.analyses.all_motions import verdicts as motions
 from stickslip.analyses.all_motions.records import FoundMotions
 from stickslip.analyses.columns import record_of
 from stickslip.analyses.forced_response.verdicts.curve import jumps
+from stickslip.analyses.forced_response.verdicts.rules import coarse_steps
 from stickslip.analyses.limit_cycle import verdicts as cycles
 from stickslip.analyses.limit_cycle.records import LimitCycles
 from stickslip.analyses.modal_synthesis import verdicts as synthesis
@@ -980,3 +981,35 @@ def test_a_mode_that_is_not_alone_is_told(changes: Any, resolved: float, changed
 def test_shares_are_written_with_the_digits_that_count(share: float, text: str) -> None:
     assert percent(share) == text
     assert percent(share, unit=False) == text.removesuffix(" %")
+
+
+@pytest.mark.parametrize(
+    ("changed", "doubted"),
+    [
+        ({}, False),
+        ({"hz": np.array([98.0, 99.0, above(100.0)])}, True),
+        ({"hz": np.array([98.0, 99.0, 102.0]), "branch": np.array([0, 1])}, False),
+        ({"hz": np.array([98.0, 102.0]), "stepped": False}, False),
+        ({"hz": np.array([98.0, 102.0]), "range_key": "frequencies_hz"}, False),
+        ({"hz": np.array([98.0, 102.0]), "range_key": "speed_rpm"}, True),
+        ({"hz": np.array([98.0, 102.0]), "numbers": SimpleNamespace(peak_damping=NAN)}, False),
+        ({"hz": np.array([98.0, 102.0]), "peak": -1}, False),
+    ],
+)
+def test_steps_are_doubted_above_half_the_width_of_the_resonance(changed: dict[str, Any], doubted: bool) -> None:
+    """At 100 Hz with a damping ratio of 1 % the width is 2 Hz."""
+    case = {
+        "peak": 1,
+        "peak_hz": 100.0,
+        "stepped": True,
+        "range_key": "frequency_hz",
+        "numbers": SimpleNamespace(peak_damping=0.01),
+        "hz": np.array([98.0, 99.0, 100.0]),
+    } | changed
+    case.setdefault("branch", np.arange(case["hz"].size))
+    found = list(coarse_steps(SimpleNamespace(**case)))  # type: ignore[arg-type]
+    assert bool(found) == doubted
+    if found:
+        assert found[0].level == "doubtful"
+        assert "2 Hz wide at half power" in found[0].why
+        assert found[0].remedy.startswith("Give forced_response.frequencies = ")

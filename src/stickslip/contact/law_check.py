@@ -3,7 +3,7 @@
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.contact.law import FULLY_COUPLED, OPEN, PAIRS, STICK, ContactLaw
+from stickslip.contact.law import FULLY_COUPLED, OPEN, PAIRS, STICK, ContactLaw, check_law_members
 from stickslip.errors import InputError, input_error
 
 ALLOWED = (5, 7, 9)
@@ -41,6 +41,22 @@ def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int 
         pressure grows as the bodies separate, `stuck_stiffness` differs from the stiffness of the sticking law, or
         every point was at a kink; the message names the entry and both numbers.
     """
+    if _tried(law, size, rate, steps, seed) == 0:
+        raise _refused(law, "each point of the path is next to a kink", "Give another `size` or `rate`.")
+
+
+def law_fault(law: ContactLaw, size: float, rate: float) -> str:
+    """Return what `check_law` finds wrong with a law, as a sentence; empty for a sound law and where every point is at a kink."""
+    try:
+        _tried(law, size, rate, steps=200, seed=0)
+    except InputError as error:
+        return str(error.problem)
+    return ""
+
+
+def _tried(law: ContactLaw, size: float, rate: float, steps: int, seed: int) -> int:
+    """Check a law along a random path, and return the number of compared derivatives."""
+    check_law_members(type(law).__name__, law)
     if law.pairs not in ALLOWED:
         raise _refused(law, f"pairs is {law.pairs}", "Give 5, 7 or 9 (see ContactLaw).")
     rng = np.random.default_rng(seed)
@@ -58,11 +74,10 @@ def check_law(law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int 
     out_scale[out_scale == 0.0] = 1.0
     in_scale = np.concatenate([np.full(3, size), np.full(3, rate), out_scale[3:]])
     compared = sum(_compare(law, *stop, out_scale, in_scale) for stop in path)
-    if compared == 0:
-        raise _refused(law, "each point of the path is next to a kink", "Give another `size` or `rate`.")
     stops = [point for point, _, _ in path] + _at_rest(law, size)
     _check_normal(law, stops, size)
     _check_stuck(law, stops)
+    return compared
 
 
 def _at_rest(law: ContactLaw, size: float) -> list[FloatArray]:

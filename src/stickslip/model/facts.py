@@ -81,10 +81,19 @@ def facts_of_parts(parts: Iterable[Part]) -> Facts:
     )
 
 
+LARGEST_SIZE_M = (
+    20.0  # corner to corner: rotors measure up to 7 m, and a blade of 21 mm is larger if its mm are read as m
+)
+
+
 def unlike_units(parts: Mapping[str, Part]) -> list[str]:
-    """Return a sentence for each pair of parts whose sizes or materials differ so much that units are probably wrong."""
+    """Return a sentence for each part, or pair of parts, whose size or material differs so much that units are probably wrong."""
     names = list(parts)
-    found = []
+    found = [
+        f"part.{name} measures {_size(part):.3g} m from corner to corner: are its coordinates in mm?"
+        for name, part in parts.items()
+        if part.solid is not None and _size(part) > LARGEST_SIZE_M
+    ]
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
             for what, unit, measure in _MEASURES:

@@ -27,6 +27,7 @@ from stickslip.solve.newton_method import newton
 
 STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields of laws, N/m and N/m³
 STEP = 1e-5  # relative step of the stiffness, and of the motion for the amplitude, in central differences
+FOLLOWS_RTOL = 1e-9  # rounding of a stuck stiffness; the steps of the stiffness are far larger
 APART = 1e-4  # relative distance of the two frequencies
 TINY = float(np.finfo(float).tiny)
 PEAK_DISTANCE_RTOL = 0.005  # largest relative distance of a peak from its solved point
@@ -49,8 +50,10 @@ class StiffnessSlope:
     omega: float
 
 
-def stiffer(interface: Interface, factor: float) -> Interface:
+def stiffer(interface: Interface, factor: float) -> Interface | None:
     """Return contacts with all stiffnesses times a factor; friction, preloads and initial gaps do not change.
+
+    None if it is not known which parameters of a law are stiffnesses.
 
     Parameters
     ----------
@@ -59,17 +62,43 @@ def stiffer(interface: Interface, factor: float) -> Interface:
     factor
         Factor on the stiffnesses along t, w and n. A negative preload, which represents a gap, is multiplied as well.
     """
-    return replace(interface, laws=tuple(_stiffer(law, factor) for law in interface.laws))
+    laws = [_stiffer(law, factor) for law in interface.laws]
+    known = tuple(law for law in laws if law is not None)
+    return replace(interface, laws=known) if len(known) == len(laws) else None
 
 
-def _stiffer(law: ContactLaw, factor: float) -> ContactLaw:
+def _stiffer(law: ContactLaw, factor: float) -> ContactLaw | None:
+    """Return the law with its stiffnesses times a factor; None if its stuck stiffness does not follow them.
+
+    A law of one's own may give its stiffnesses other names: fields on which the stuck stiffness depends.
+    """
     own: Any = law
     names = [f.name for f in fields(own)]
-    values = {name: getattr(own, name) for name in STIFFNESSES if name in names}
-    changed = {name: factor * value for name, value in values.items() if value}
+    changed = {name: factor * getattr(own, name) for name in STIFFNESSES if name in names and getattr(own, name)}
     if "preload" in names and own.preload < 0.0:
         changed["preload"] = factor * own.preload
-    return law if not changed else replace(own, **changed)
+    if _follows(own, changed, factor):
+        return law if not changed else replace(own, **changed)
+    for name in names:
+        more = None if name in changed else _times(getattr(own, name), factor)
+        if more is not None and not _follows(own, {name: more}, 1.0):
+            changed[name] = more
+    return replace(own, **changed) if _follows(own, changed, factor) else None
+
+
+def _times(value: object, factor: float) -> float | tuple[float, ...] | None:
+    """Return a number, or a tuple of numbers, times a factor; None for anything else."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return factor * value
+    if isinstance(value, tuple) and all(isinstance(one, (int, float)) for one in value):
+        return tuple(factor * one for one in value)
+    return None
+
+
+def _follows(law: Any, changed: dict[str, Any], factor: float) -> bool:
+    """Whether the stuck stiffness of a law with these fields changed is `factor` times the law's own."""
+    before, after = (np.asarray(one.stuck_stiffness(), dtype=float) for one in (law, replace(law, **changed)))
+    return bool(np.allclose(after, factor * before, rtol=FOLLOWS_RTOL, atol=0.0))
 
 
 def stiffness_slope(
@@ -91,11 +120,15 @@ def stiffness_slope(
     Returns
     -------
     StiffnessSlope or None
-        None if contacts are rigid, no contact has a stiffness, or the Jacobian is singular.
+        None if contacts are rigid, no contact has a stiffness, it is not known which parameters of a law are
+        stiffnesses, or the Jacobian is singular.
     """
     balance = problem.balance(point.support)
     interface = problem.low.interface
-    if not isinstance(balance, HarmonicBalance) or stiffer(interface, 2.0).laws == interface.laws:
+    if not isinstance(balance, HarmonicBalance) or interface.rigid:
+        return None
+    twice = stiffer(interface, 2.0)
+    if twice is None or twice.laws == interface.laws:
         return None
     here = _slopes(problem, balance, point, output)
     if here is None:
@@ -144,7 +177,8 @@ def _by_stiffness(balance: HarmonicBalance, x: FloatArray, omega: float) -> Floa
     evaluator = balance.compiled.evaluator
     forces = []
     for factor in (1.0 + STEP, 1.0 - STEP):
-        compiled = stiffer(balance.interface, factor).compiled(evaluator)
+        known = stiffer(balance.interface, factor)
+        compiled = (balance.interface if known is None else known).compiled(evaluator)
         forces.append(replace(balance, compiled=compiled).forces(x, omega).coefficients)
     return balance.scaled_forces((forces[0] - forces[1]) / (2.0 * STEP))
 

@@ -320,6 +320,8 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
     verdict: object = _of_a_user(strategy, step, place) if own else strategy.judge(step)
     if not isinstance(verdict, Verdict):
         raise input_error(place, f"returned a {type(verdict).__name__}", "Return a Verdict.")
+    if own:
+        _check_verdict(verdict, step, place)
     each = of_all((verdict.again_by_dof or ()) + (verdict.following_by_dof or ()))
     beyond = {*(verdict.again or ()), *verdict.following, *each} - set(step.reference.harmonics)
     if beyond:
@@ -336,6 +338,26 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
             f"Return a finite number: above the threshold, {strategy.threshold:g}, it asks for more harmonics.",
         )
     return verdict
+
+
+def _check_verdict(verdict: Verdict, step: Step, place: str) -> None:
+    """Refuse harmonics and a start of a user's verdict that have another form than asked for."""
+    for name in ("again", "following"):
+        value: object = getattr(verdict, name)
+        some = isinstance(value, (tuple, list)) and all(isinstance(h, numbers.Integral) for h in value)
+        if not some and not (name == "again" and value is None):
+            remedy = "Return a tuple of harmonics, such as (0, 1, 2, 3)" + ", or None: accepted." * (name == "again")
+            raise input_error(place, f"returned {name} = {_short(value)}", remedy.rstrip(".") + ".")
+    start: object = verdict.start
+    n = step.balance.linear.n
+    if start is not None and not (isinstance(start, np.ndarray) and start.ndim == 2 and start.shape[1] == n):
+        remedy = f"Return an array of (harmonics, {n}) coefficients, one column a retained coordinate, or None."
+        raise input_error(place, f"returned start = {_short(start)}", remedy)
+
+
+def _short(value: object) -> str:
+    """Return a value in few words."""
+    return f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
 
 
 def _of_a_user(strategy: Strategy, step: Step, place: str) -> object:

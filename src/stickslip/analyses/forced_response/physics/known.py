@@ -7,6 +7,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.law_check import law_fault
+from stickslip.contact.laws import law_name
 from stickslip.model.structure import ROTATIONS
 from stickslip.response.free_motion import drift
 from stickslip.study.verdict import Verdict, doubt
@@ -32,6 +35,7 @@ def known(question: Question, response: Response, shift: tuple[float, float]) ->
         *(mixed_places(question.model.error_labels) if question.sweep.relative_to == "each" else ()),
         *nothing_pressed(question),
         *off_engine_order(question),
+        *laws_of_ones_own(question, response),
         *_of_drift(question, response),
         *_of_retention(question, response, shift),
     )
@@ -70,6 +74,25 @@ def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
     )
     remedy = "Check gaps, preloads, static loads and the direction in which the speed moves the surfaces."
     return (Verdict("doubtful", why=why, remedy=remedy),)
+
+
+def laws_of_ones_own(question: Question, response: Response) -> Iterator[Verdict]:
+    """Doubt a law of one's own whose derivatives or stuck stiffness are wrong, tried with the motion at the peak."""
+    top = response.top
+    if top is None or top.fields is None:
+        return
+    laws = question.model.system.interface.laws
+    sizes = np.abs(top.fields.gaps[1:]).max(axis=(0, 2), initial=0.0)
+    largest: dict[int, tuple[ContactLaw, float]] = {}  # a law may have no hash
+    for law, size in zip(laws, map(float, sizes), strict=True):
+        if law_name(law) == type(law).__name__ and size > largest.get(id(law), (law, 0.0))[1]:
+            largest[id(law)] = law, size
+    for law, size in largest.values():
+        fault = law_fault(law, size, top.point.omega * size)
+        if fault:
+            remedy = "Correct the law; stickslip.contact.check_law tries it. A wrong derivative costs Newton steps, and what the contact stiffness changes is then wrong."
+            yield Verdict("doubtful", why=f"the law {type(law).__name__} is inconsistent: {fault}", remedy=remedy)
+            return
 
 
 def off_engine_order(question: Question) -> tuple[Verdict, ...]:

@@ -512,6 +512,24 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful", why, remedy)
 
 
+COARSE = 0.5  # step over the half-power width above which a resonance may be missed: four points a width show each
+
+
+def coarse_steps(case: Curve) -> Iterator[Finding]:
+    """Doubt a peak among equally spaced frequencies that are too far apart to show every resonance as narrow as this one."""
+    width = 2.0 * case.numbers.peak_damping * case.peak_hz
+    if case.peak < 0 or not case.stepped or case.range_key == "frequencies_hz" or not width > 0.0:
+        return
+    hz = np.unique(case.hz[case.branch])
+    step = float(np.diff(hz).max()) if hz.size > 1 else 0.0
+    if step > COARSE * width:
+        why = f"the frequencies are up to {step:.2g} Hz apart, and the resonance at the peak is {width:.2g} Hz wide at half power: a larger one may stand between them"
+        enough = int(np.ceil((hz[-1] - hz[0]) / (COARSE * width))) + 1
+        yield Finding(
+            "doubtful", why, f"Give forced_response.frequencies = {enough}, or points, which follow the curve."
+        )
+
+
 def retention(case: Curve) -> Iterator[Finding]:
     """Doubt a peak that depends on the retention stiffness, which is not physical."""
     shift = case.numbers.retention_peak_shift
@@ -546,5 +564,6 @@ RULES: tuple[Rule, ...] = (
     beside_the_amplitude,
     folds,
     at_the_end,
+    coarse_steps,
     retention,
 )
