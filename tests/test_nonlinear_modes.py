@@ -390,7 +390,7 @@ def case_of(end: str, status: list[int], change: list[float], problem: str = "")
             [0, 0, -1],
             [1e-4, 1e-4, np.nan],
             "trusted",
-            "mode 1 followed from 1 to 2 mm: the largest damping ratio is 5 % at 2 mm",
+            "mode 1 followed from 1 to 2 mm: the largest damping ratio is 5 % at 2 mm, an end of the range: it may be larger beyond",
         ),
         ("amplitude reached", [0, 0], [1e-4, 2e-3], "doubtful", "1 of its 2 motions still change by up to 0.2 %"),
         ("amplitude reached", [0, 0], [np.nan, np.nan], "doubtful", "one set of harmonics alone"),

@@ -24,6 +24,9 @@ def case_verdicts(label: str, found: NonlinearModes) -> list[Verdict]:
     return [*verdicts, Verdict("trusted", label, None, _followed(found, sound))] if sound else verdicts
 
 
+AT_AN_END = 1e-6  # relative distance of two amplitudes that are the same
+
+
 def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
     """State the range of amplitudes of the modes without doubts, and their largest damping ratio."""
     every = len(found.branches)
@@ -33,9 +36,11 @@ def _followed(found: NonlinearModes, sound: Sequence[ModeBranch]) -> str:
     who = most.name if every == 1 else f"{len(sound)} of {every} modes"
     damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"
     where = f" at {millimetres(at)}" if abs(ratio) > NONE else ""
+    ends = np.nanmin(most.amplitude), np.nanmax(most.amplitude)
+    end = ", an end of the range: it may be larger beyond" * bool(where and np.isclose(at, ends, rtol=AT_AN_END).any())
     of = f", of {most.name}" if every > 1 and where else ""
     sizes = millimetres_between(float(np.nanmin(amplitude)), float(np.nanmax(amplitude)))
-    return f"{who} followed from {sizes}: {damping}{where}{of}{_by_the_other_concept(found, most)}"
+    return f"{who} followed from {sizes}: {damping}{where}{of}{end}{_by_the_other_concept(found, most)}"
 
 
 def _by_the_other_concept(found: NonlinearModes, branch: ModeBranch) -> str:
