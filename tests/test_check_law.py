@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.analyses.forced_response.physics.limits import _rubs_by_normal_force
 from stickslip.contact.law import law_kernel
 from stickslip.contact.law_check import check_law
 from stickslip.contact.laws import LAWS
@@ -92,6 +93,11 @@ class _Coupled(_Law):
         return np.zeros(3)
 
 
+class _PressedLaw(_Law):
+    def stuck_stiffness(self):
+        return np.array([1.0, 0.0, 2.0])
+
+
 class _Own(ElasticCoulomb):
     """Its normal stiffness is told in its parameters or in `stuck_stiffness` alone."""
 
@@ -154,6 +160,21 @@ def test_a_run_doubts_a_law_of_ones_own_that_is_inconsistent():
     (told,) = [v.why for v in found.verdicts if "inconsistent" in v.why]
     assert "the law _Wrong is inconsistent: jac[0, 0], force[0] by displacement[0], is 1," in told
     assert found.conclusion.startswith("Not to be trusted")
+
+
+@pytest.mark.parametrize(
+    ("law", "follows"),
+    [
+        (ElasticCoulomb(k_t=2e6, k_w=1e6, k_n=3e6, mu=0.4, preload=10.0), True),
+        (ss.Jenkins(k_t=2.0, limit=1.0, k_n=1.0), False),  # its limit is a force of its own
+        (_Own(k_t=2e6, k_w=1e6, k_n=3e6, mu=0.4), True),
+        (_Wrong(), False),
+        (_PressedLaw(), True),
+    ],
+    ids=lambda x: type(x).__name__ if not isinstance(x, bool) else "",
+)
+def test_the_friction_of_a_law_with_a_normal_stiffness_may_follow_the_normal_force(law, follows):
+    assert _rubs_by_normal_force(law) == follows
 
 
 @pytest.mark.parametrize("preload", [10.0, -5.0])

@@ -10,6 +10,8 @@ from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import MotionAtPeak, PhysicsVerdicts, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws import law_name
 from stickslip.errors import InputError
 from stickslip.response.damping_of_modes import (
     UNDAMPED_RATIO,
@@ -236,7 +238,7 @@ def _loads_move(question: Question, response: Response) -> str:
     if response.top is None:
         return "there is no peak"
     laws = question.model.system.springs.laws
-    follows = np.array([hasattr(law, "mu") for law in laws], dtype=bool)
+    follows = np.array([_rubs_by_normal_force(law) for law in laws], dtype=bool)
     if not follows.any():
         return ""
     normal = -signals(question.problem, response.top.point).force[follows, 2]
@@ -247,9 +249,15 @@ def _loads_move(question: Question, response: Response) -> str:
     swing = 0.5 * (pressed.max(axis=1) - pressed.min(axis=1)) / pressed.mean(axis=1)
     opened = np.any(pressed <= 0.0, axis=1)
     if opened.any():
-        return f"{opened.sum()} of {len(pressed)} contact points open at the peak"
+        return f"{opened.sum()} of {len(pressed)} contact points that are pressed on average open at the peak"
     most = float(np.average(swing, weights=pressed.mean(axis=1)))
     return f"normal forces at the peak swing by {100 * most:.0f} % of their mean" if most > STEADY else ""
+
+
+def _rubs_by_normal_force(law: ContactLaw) -> bool:
+    """Whether the friction of a law follows the normal force; of a law of one's own: whether it has a normal stiffness."""
+    own = law_name(law) == type(law).__name__
+    return hasattr(law, "mu") or (own and float(law.stuck_stiffness()[2]) != 0.0)
 
 
 def _modes(every: list[RangeMode]) -> str:
