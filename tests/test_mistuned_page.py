@@ -64,6 +64,7 @@ def test_a_tile_tells_amplification_and_largest_blade() -> None:
     (shift,) = (c for c in shown if "shift of the peak" in c.label)
     assert "Hz (tip[0].x) with" in shift.note
     assert "Hz (tip[2].x) with" in shift.note
+    assert ". 1.5 times the wheel with all sectors alike. " in shown[0].note  # of the case with the smallest peak
 
 
 def test_a_blade_that_is_named_stays_the_one_of_the_peak() -> None:

@@ -90,6 +90,9 @@ def _answer(response: Response) -> Card:
         told.append("The largest amplitude stands at the end of the sweep: no resonance")
     elif len(within) < len(cases):
         told.append(f"In {counted(len(cases) - len(within), 'other')} the largest stands at the end of the sweep")
+    factor = response.blades[best.index].amplification
+    if np.isfinite(factor):
+        told.append(f"{number(factor, 3)} times the wheel with all sectors alike")
     lower = min(counted_in, key=lambda c: peaks[c])
     if peaks[lower] < peaks[best]:
         told.append(f"{_size(response, lower)} is {response.level(lower)}{lower.where}")
