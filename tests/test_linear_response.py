@@ -1,5 +1,6 @@
 """Forced responses of models without contacts: closed forms, wheels, checks, and what needs a contact."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,15 @@ def test_what_is_about_contacts_refuses_a_model_without_any(analysis: str, keys:
 def test_shooting_needs_a_contact() -> None:
     with pytest.raises(ss.InputError, match="is shooting, and the model has no contact"):
         two_masses().forced_response(hz=(0.1, 0.35), points=8, method="shooting")
+
+
+def test_an_undamped_response_without_contacts_is_wrong_and_says_why() -> None:
+    model = two_masses()
+    bare = ss.Part(structure=ss.model.lumped(np.eye(2), STIFFNESS, np.zeros((2, 2)), names=("a", "b")))
+    found = replace(model, parts={"p": bare}).forced_response(hz=(0.1, 0.2), points=6)
+    assert "wrong" in found.conclusion
+    (told,) = [v.why for v in found.verdicts if v.level == "wrong"]
+    assert told.startswith("nothing damps the mode at 0.16 Hz: the peak has no finite value")
 
 
 def test_steps_as_wide_as_a_resonance_are_doubted() -> None:

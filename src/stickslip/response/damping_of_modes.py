@@ -80,7 +80,7 @@ def friction_of(interface: Interface, static_gap: FloatArray, static_force: Floa
         size = np.linalg.norm(force[1:, :, axis], axis=0)
         limit = np.abs(work) / (4.0 * TRAVEL_M)
         limits[:, axis] = np.where(limit > ROUNDING * size, limit, 0.0)
-    follows = np.array([hasattr(law, "mu") and law.stuck_stiffness()[2] > 0 for law in interface.laws])
+    follows = np.array([hasattr(law, "mu") and law.stuck_stiffness()[2] > 0 for law in interface.laws], dtype=bool)
     pressed = static_force[:, 2] < 0.0
     return Friction(limits, np.asarray(follows & pressed, dtype=bool))
 

@@ -107,7 +107,7 @@ def of_pressures(case: Case, model: Model) -> tuple[str, ...]:
 
 
 def beside_the_range(question: Question) -> list[str]:
-    """Return the natural frequencies below, in and above the range of the sweep, contacts open and stuck, if there are any."""
+    """Return the natural frequencies below, in and above the range of the sweep; of a model with contacts, with these open and stuck."""
     times = question.driven[0]
     lowest, highest = (times * omega / HZ for omega in question.sweep.omega_range)
     known, told = question.model.frequencies, []

@@ -305,13 +305,8 @@ def _values(solved: Solved) -> Values:
     return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
 
 
-REPEATED: tuple[Stage, ...] = (
-    "audit",
-    "trial",
-    "check",
-    "settled",
-    "compared",
-)  # solutions of points that stand without them
+# solutions of points that stand without them
+REPEATED: tuple[Stage, ...] = ("audit", "trial", "check", "settled", "compared")
 IN_WORDS: dict[Stage, str] = {
     "low": "low harmonics",
     "high": "more harmonics",

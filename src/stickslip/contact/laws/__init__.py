@@ -42,5 +42,10 @@ ALL_LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP | {"rigid_coulomb": "RigidC
 
 def law_name(law: object) -> str:
     """Return the name of a law in study files; for a user's law, the name of its class."""
+    return type(law).__name__ if is_of_a_user(law) else type(law).__module__.rpartition(".")[2]
+
+
+def is_of_a_user(law: object) -> bool:
+    """Whether a law is none of the laws of study files."""
     package, _, name = type(law).__module__.rpartition(".")
-    return name if package == __name__ and name in ALL_LAWS else type(law).__name__
+    return package != __name__ or name not in ALL_LAWS

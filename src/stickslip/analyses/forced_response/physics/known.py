@@ -9,7 +9,7 @@ from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.law_check import law_fault
-from stickslip.contact.laws import law_name
+from stickslip.contact.laws import is_of_a_user
 from stickslip.model.structure import ROTATIONS
 from stickslip.response.free_motion import drift
 from stickslip.study.verdict import Verdict, doubt
@@ -85,7 +85,7 @@ def laws_of_ones_own(question: Question, response: Response) -> Iterator[Verdict
     sizes = np.abs(top.fields.gaps[1:]).max(axis=(0, 2), initial=0.0)
     largest: dict[int, tuple[ContactLaw, float]] = {}  # a law may have no hash
     for law, size in zip(laws, map(float, sizes), strict=True):
-        if law_name(law) == type(law).__name__ and size > largest.get(id(law), (law, 0.0))[1]:
+        if is_of_a_user(law) and size > largest.get(id(law), (law, 0.0))[1]:
             largest[id(law)] = law, size
     for law, size in largest.values():
         fault = law_fault(law, size, top.point.omega * size)

@@ -11,7 +11,7 @@ from stickslip.analyses.forced_response.records.columns import MotionAtPeak, Phy
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws import law_name
+from stickslip.contact.laws import is_of_a_user
 from stickslip.errors import InputError
 from stickslip.response.damping_of_modes import (
     UNDAMPED_RATIO,
@@ -50,12 +50,19 @@ class Physics:
         Friction forces of the contacts under the static loads.
     damped
         Effect of friction on each mode.
+    touching
+        Whether there are contacts.
     """
 
     stuck: tuple[RangeMode, ...]
     sliding: tuple[RangeMode, ...]
     friction: Friction
     damped: tuple[DampedMode, ...]
+    touching: bool
+
+    def where(self, text: str) -> str:
+        """Return words about contacts; empty without contacts."""
+        return text if self.touching else ""
 
     @property
     def undamped(self) -> list[RangeMode]:
@@ -87,7 +94,7 @@ def physics_of(question: Question) -> Physics | None:
     """
     model = question.model if question.model.blades is None else question.model.blades.tuned
     system, load = model.system, model.load
-    if not system.structure.reduced or not system.interface.n_contacts:
+    if not system.structure.reduced:
         return None
     within = Range(*sorted(question.sweep.omega_range))
     friction = friction_of(system.springs, model.static_gap, model.static_force)
@@ -99,7 +106,7 @@ def physics_of(question: Question) -> Physics | None:
         damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
     except InputError:  # the range exceeds the table of aerodynamic coefficients
         return None
-    return Physics(modes[0], modes[1], friction, tuple(damped))
+    return Physics(modes[0], modes[1], friction, tuple(damped), bool(system.interface.n_contacts))
 
 
 def beforehand(physics: Physics) -> Iterator[Verdict]:
@@ -112,7 +119,8 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
     """
     if physics.undamped:
         slip = "only slip bounds it" if physics.friction.any else "nothing bounds it"
-        why = f"nothing damps {_modes(physics.undamped)} while contacts stick: {slip}, and a peak where nothing slips has no finite value"
+        stick, still = physics.where(" while contacts stick"), physics.where(" where nothing slips")
+        why = f"nothing damps {_modes(physics.undamped)}{stick}: {slip}, and a peak{still} has no finite value"
         yield Verdict("doubtful", why=why, remedy=GIVE_DAMPING)
     yield from _of_bounds(physics)
     yield from _of_bodies(physics)
@@ -127,7 +135,7 @@ def driven_line(physics: Physics) -> list[str]:
     others = [m for m in physics.stuck if m.force > 0.0 and m is not top]
     beside = f"; it drives {_modes(others)} less" if others else ""
     return [
-        f"the load drives the mode at {top.hz:.2f} Hz most (pressed contacts stuck): the resonance while nothing slips{beside}"
+        f"the load drives the mode at {top.hz:.2f} Hz most{physics.where(' (pressed contacts stuck): the resonance while nothing slips')}{beside}"
     ]
 
 
@@ -162,10 +170,10 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         return
     known = _damping(question, top)
     if known < UNDAMPED_RATIO and _decided_by_damping(question, top):
-        why = (
-            f"nothing damps {_modes(physics.undamped)} while contacts stick, and at the peak nothing slips enough to (equivalent damping "
-            f"{_plain(known)} of critical): the peak has no finite value, the number tells how near to it a frequency was solved"
+        idle = physics.where(
+            f" while contacts stick, and at the peak nothing slips enough to (equivalent damping {_plain(known)} of critical)"
         )
+        why = f"nothing damps {_modes(physics.undamped)}{idle}: the peak has no finite value, the number tells how near to it a frequency was solved"
         yield Verdict("doubtful" if question.sweep.grid.size else "wrong", why=why, remedy=GIVE_DAMPING)
         return
     for mode in physics.undamped:
@@ -178,7 +186,8 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         # peaks may be missed between listed frequencies, on a followed branch only those limited by damping alone
         missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
         if missed and _damping(question, most) < UNDAMPED_RATIO:
-            why = f"nothing damps the mode at {mode.hz:.2f} Hz while contacts stick, and nothing slips where it was solved: a larger peak may stand there"
+            idle = physics.where(" while contacts stick, and nothing slips where it was solved")
+            why = f"nothing damps the mode at {mode.hz:.2f} Hz{idle}: a larger peak may stand there"
             remedy = f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
             yield Verdict("doubtful", why=why, remedy=remedy)
 
@@ -256,8 +265,7 @@ def _loads_move(question: Question, response: Response) -> str:
 
 def _rubs_by_normal_force(law: ContactLaw) -> bool:
     """Whether the friction of a law follows the normal force; of a law of one's own: whether it has a normal stiffness."""
-    own = law_name(law) == type(law).__name__
-    return hasattr(law, "mu") or (own and float(law.stuck_stiffness()[2]) != 0.0)
+    return hasattr(law, "mu") or (is_of_a_user(law) and float(law.stuck_stiffness()[2]) != 0.0)
 
 
 def _modes(every: list[RangeMode]) -> str:

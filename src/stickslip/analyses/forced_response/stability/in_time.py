@@ -177,9 +177,8 @@ APART = 10.0  # percent: a motion in time farther than this from every balance i
 KICK = 1e-3  # disturbance of velocities relative to their amplitude, for motions not known to be stable
 SHOWN = 1e3  # growth or decay of a disturbance that shows the stability
 RINGS = 1e-3  # largest scatter of a motion that is periodic except for undamped ringing
-RINGS_ON = (
-    2e-4  # scatter up to which an integration ends early if it neither decays nor grows; a fifth of the disturbance
-)
+# scatter up to which an integration ends early if it neither decays nor grows; a fifth of the disturbance
+RINGS_ON = 2e-4
 DECAYS, GROWS = 0.5, 1.1  # change within the last third of an integration over the change within the third before
 GROWS_CLEARLY = 1.5  # the same for ringing within `RINGS_ON`, whose largest changes vary from third to third; 0.2 % a period over 200 periods
 MOST_TOLD = 10**6  # largest number of periods that is stated
@@ -277,8 +276,8 @@ def balance_from_time(
     -------
     ForcedPoint or None
         The balance with the fewest harmonics of `RAISED` whose outputs differ from the motion in time by less than half
-        the tolerated error, phases included, else the nearest within that error; None if there is none, or if it is
-        another motion than the point.
+        the tolerated error, phases included. If no balance is so near, it is the nearest within the tolerated error.
+        None without such a balance, and for another motion than the point's.
     """
     problem, system = question.problem, question.model.system
     highest = min(RAISED[-1], MOST_ROWS // (2 * system.retained.size))
