@@ -227,7 +227,9 @@ def test_unmatched_nodes_are_listed():
     assert "1 of 4 nodes of 'cyclic_low', turned by 60°" in message
     assert f"node {node} at (" in message
     assert f"nearest node {partner} off by 0.01 m" in message
-    with pytest.raises(InputError, match=r"1 of 4 nodes of 'cyclic_high'.*Mesh both faces alike"):
+    with pytest.raises(
+        InputError, match=r"1 of 4 nodes of 'cyclic_high'.*Clamp the nodes of both faces or of neither\. Mesh both"
+    ):
         cyclic_sector(torn, 6)
     assert cyclic_sector(torn, 6, tolerance=0.02).low.size == sector.low.size
 
@@ -243,6 +245,34 @@ def test_wrong_number_of_sectors_is_recognised():
     structure = random_sector(24)
     with pytest.raises(InputError, match=r"are 15° apart, 23 sectors need 15.652°. Say sectors=24"):
         cyclic_sector(structure, 23)
+
+
+def test_wrong_number_of_sectors_is_recognised_though_nodes_are_clamped_on_one_face():
+    structure = random_sector(24, faces=6)
+    node = structure.dofs.node[structure.sets["cyclic_low"][0]]
+    with pytest.raises(InputError, match=r"are 15° apart, 12 sectors need 30°. Say sectors=24"):
+        cyclic_sector(without(structure, [node]), 12)
+
+
+def test_the_set_that_was_meant_is_named_first():
+    """A wrong set on either side; the same set twice; sets that no other one meets."""
+    structure = random_sector(24, faces=6)
+    low, high = (structure.sets[f"cyclic_{side}"] for side in ("low", "high"))
+    inner = np.setdiff1d(np.arange(structure.n), np.concatenate([low, high]))
+    sets = {"LO": low, "HI": high, "ALL": np.arange(structure.n), "inner": inner}
+    named = replace(structure, sets=sets)
+    for one, other, words in [
+        ("LO", "inner", "The set 'HI' meets 'LO': name it as the high face."),
+        ("inner", "HI", "The set 'LO' meets 'HI': name it as the low face."),
+        ("LO", "LO", "are 0° apart, 24 sectors need 15°. The set 'HI' meets 'LO': name it as the high face."),
+    ]:
+        with pytest.raises(InputError) as caught:
+            cyclic_sector(named, 24, low=one, high=other)
+        assert str(caught.value).endswith(words)
+        assert str(caught.value).count(" nearest node ") <= 2  # one a face where none fits
+    lonely = replace(structure, sets={"LO": low, "inner": inner})
+    with pytest.raises(InputError, match=r"° apart: name the two cut faces of a sector, or check the number"):
+        cyclic_sector(lonely, 24, low="LO", high="inner")
 
 
 def test_swapped_faces_are_recognised_though_one_lacks_nodes():

@@ -15,6 +15,7 @@ from stickslip.assembly.forces import Load, Output, beyond_sectors, doubtful_fie
 from stickslip.assembly.joints.pairs import Pairs, pair_contacts
 from stickslip.assembly.joints.surface_checks import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.joints.ties import Coordinates, Ties, coordinates, tie_joins
+from stickslip.assembly.joints.untied_faces import uncoupled, untied_faces
 from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.part_reduction import Spin, Steady, at_speed, damped, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning
@@ -37,6 +38,10 @@ from stickslip.response.forced.choices import AmplitudeOf
 
 ContactsAs = Literal["static", "stuck", "open"]
 TangentAtSpeed = Literal["consistent", "textbook"]
+_UNCOUPLED = (
+    "nothing couples the {} sectors: each vibrates alone. Name the cyclic faces of a part, or give a contact with a surface "
+    '"next.part.surface".'
+)
 
 
 def without_bodies(structure: Structure, names: Collection[str]) -> Structure:
@@ -253,12 +258,17 @@ class Model:
         """Return the warnings for the user."""
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
+        between = [*(c.between for c in self.contacts.values()), *(j.between for j in self.joins.values())]
+        touched = [name for pair in between for name in pair]
+        if self.aerodynamics is None and uncoupled(self.parts, touched):
+            of_wheel = (_UNCOUPLED.format(self.sectors),)
         of_units = unlike_units(self.parts)
         of_outputs = far_outputs(self.places, self.outputs)
         of_fields = doubtful_fields(self.places, self.loads)
         of_speeds = other_speeds(self.parts, self.speed)
         orders = beyond_sectors(self.loads, self.sectors)
-        own = [*of_parts, *of_units, *of_speeds, *of_outputs, *of_wheel, *orders, *of_fields]
+        of_faces = untied_faces(self.parts, touched)
+        own = [*of_parts, *of_faces, *of_units, *of_speeds, *of_outputs, *of_wheel, *orders, *of_fields]
         return tuple(dict.fromkeys([*own, *self.pairs.warnings]))
 
     def spin(self, speed: float) -> Spin:

@@ -170,6 +170,9 @@ class Part:
         Names of sets whose nodes are all clamped, so that nothing can act on them.
     own_speed
         Speed in the part's file, rad/s; 0: the file has none. All parts of a model have the same speed.
+    alone
+        Whether the part is known to be no sector of a wheel, or its faces to be free. Else faces that would meet the part's
+        copies in the neighbouring sectors are doubted where nothing holds them.
 
     Raises
     ------
@@ -194,6 +197,7 @@ class Part:
     warnings: tuple[str, ...] = ()
     clamped_sets: tuple[str, ...] = ()
     own_speed: float = 0.0
+    alone: bool = False
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # reductions already computed
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -21,7 +22,9 @@ from stickslip.reduction.waves import check_sectors, wave
 
 TOLERANCE = 1e-5  # distance of partners over the faces' size: coordinates in text files have six digits or more
 PARTNERED_NODES_SHARE = 0.8  # fraction of nodes with partners, above which the faces match except for some nodes
-LISTED = 6  # largest number of unmatched nodes in a message
+FEW_UNMATCHED_SHARE = 0.5  # fraction of nodes with partners, above which the sets are the two faces of a sector
+NEAR_PITCH = 0.1  # largest deviation from the pitch, over the pitch, of faces whose meshes do not match
+LISTED = 6  # largest number of unmatched nodes in a message, where most have partners; otherwise one is named
 ROUNDING = 1e-9  # smaller entries of null vectors are rounding
 
 
@@ -97,7 +100,9 @@ def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -
         )
 
 
-def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float | None) -> tuple[IntArray, IntArray]:
+def pair_faces(
+    low: Face, high: Face, sectors: int, axis: Axis, tolerance: float | None, others: Iterable[Face] = ()
+) -> tuple[IntArray, IntArray]:
     """Return the dofs of `low` and, in the same order, their partners on `high`.
 
     Parameters
@@ -110,6 +115,8 @@ def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float
         Axis of the wheel.
     tolerance
         Largest distance of partners in metres; None: 1e-5 of the size of the faces.
+    others
+        Other sets, one of which the message may name as the face that was meant.
 
     Returns
     -------
@@ -131,7 +138,7 @@ def pair_faces(low: Face, high: Face, sectors: int, axis: Axis, tolerance: float
     hub, low, high = _split(low, high, axis, TOLERANCE * size if sectors > 1 else -1.0)
     partner, ok = _match(low, high, 2 * math.pi / sectors, axis, reach)
     if not (ok.all() and len(set(partner.tolist())) == len(high.node)):
-        raise _unmatched(low, high, sectors, axis, reach)
+        raise _unmatched(low, high, sectors, axis, reach, others)
     there = high.table[partner]
     differ = np.flatnonzero(np.any((low.table >= 0) != (there >= 0), axis=1))
     if differ.size:
@@ -170,7 +177,7 @@ def _nearest(points: FloatArray, among: FloatArray) -> tuple[FloatArray, IntArra
     return np.asarray(distance), np.asarray(index)
 
 
-def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) -> InputError:
+def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float, others: Iterable[Face]) -> InputError:
     """Return the error that names nodes without a partner, or explains why no node has one."""
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
@@ -181,25 +188,44 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
             f"are swapped: {high.name!r} lies {pitch:.6g}° behind {low.name!r} about the axis {axis.direction}",
             "Swap them, or turn the axis round.",
         )
-    found = _angle_between(low, high, axis)
-    partner, ok = _match(low, high, found, axis, reach)
-    if ok.all() and len(set(partner.tolist())) == len(low.node) == len(high.node):
-        degrees = math.degrees(found)
-        fits = round(360 / abs(degrees)) if degrees else 0
-        near = fits > 0 and math.isclose(360 / fits, abs(degrees), rel_tol=1e-3)
+    found = _angle_between(low, high, axis, reach)
+    if _share(low, high, found, axis, reach) > PARTNERED_NODES_SHARE > shares[0]:
+        fits = round(2 * math.pi / abs(found)) if found else 0
+        near = fits > 0 and math.isclose(2 * math.pi / fits, abs(found), rel_tol=1e-3)
         return input_error(
             f"cyclic_sector: {names}",
-            f"are {degrees:.5g}° apart, {sectors} sectors need {pitch:.5g}°",
-            f"Say sectors={fits}{', and swap them' if degrees < 0 else ''}, or check the axis {axis.direction}."
+            f"are {math.degrees(found):.5g}° apart, {sectors} sectors need {pitch:.5g}°",
+            f"Say sectors={fits}{', and swap them' if found < 0 else ''}, or check the axis {axis.direction}."
             if near
-            else "Check the number of sectors and the axis.",
+            else _remedy(low, high, sectors, axis, reach, others),
         )
     return input_error(
         f"cyclic_sector: {names}",
         _missing(low, high, 2 * math.pi / sectors, axis, reach)
         + _missing(high, low, -2 * math.pi / sectors, axis, reach)
         + f"sectors={sectors}, axis {axis.direction} through {axis.origin}, tolerance {reach:.3g} m",
-        'Mesh both faces alike or tie them in the mean, cyclic = "segment_to_segment"; clamp the nodes of both or of neither, check the axis.',
+        _remedy(low, high, sectors, axis, reach, others),
+    )
+
+
+def _remedy(low: Face, high: Face, sectors: int, axis: Axis, reach: float, others: Iterable[Face]) -> str:
+    """Return what helps against faces that do not match: nodes held alike, other sets, or another tie."""
+    angle = 2 * math.pi / sectors
+    alike = 'Mesh both faces alike, or tie them in the mean, cyclic = "segment_to_segment"'
+    if _share(low, high, angle, axis, reach) >= FEW_UNMATCHED_SHARE:
+        return f"Clamp the nodes of both faces or of neither. {alike}."
+    every = list(others)
+    for kept, sign, word in ((low, 1.0, "high"), (high, -1.0, "low")):
+        for other in every:
+            sizes = sorted([len(kept.node), len(other.node)])
+            fits = other.name not in (low.name, high.name) and sizes[0] > PARTNERED_NODES_SHARE * sizes[1]
+            if fits and _share(kept, other, sign * angle, axis, reach) > PARTNERED_NODES_SHARE:
+                return f"The set {other.name!r} meets {kept.name!r}: name it as the {word} face."
+    apart = math.degrees(_angle_between(low, high, axis, reach))
+    if abs(apart - math.degrees(angle)) < NEAR_PITCH * math.degrees(angle):
+        return f"{alike}, and check the axis."
+    return (
+        f"Both lie {apart:.4g}° apart: name the two cut faces of a sector, or check the number of sectors and the axis."
     )
 
 
@@ -216,8 +242,9 @@ def _missing(here: Face, there: Face, angle: float, axis: Axis, reach: float) ->
     if not lost.size:
         shared = np.unique(nearest).size < nearest.size
         return f"several nodes of {here.name!r} meet one of {there.name!r}; " if shared else ""
-    named = [_one_missing(here, there, i, distance[i], nearest[i]) for i in lost[:LISTED]]
-    more = f", and {lost.size - LISTED} more" if lost.size > LISTED else ""
+    listed = LISTED if lost.size <= FEW_UNMATCHED_SHARE * len(here.node) else 1
+    named = [_one_missing(here, there, i, distance[i], nearest[i]) for i in lost[:listed]]
+    more = f", and {lost.size - listed} more" if lost.size > listed else ""
     return (
         f"{lost.size} of {len(here.node)} nodes of {here.name!r}, turned by {math.degrees(angle):.6g}°, "
         f"meet none of {there.name!r}: {', '.join(named)}{more}; "
@@ -231,12 +258,24 @@ def _one_missing(here: Face, there: Face, i: int, distance: float, nearest: int)
     return f"node {here.node[i]} at ({at}) m, nearest node {there.node[nearest]} off by {distance:.3g} m"
 
 
-def _angle_between(low: Face, high: Face, axis: Axis) -> float:
-    """Return the angle about the axis, in rad, from the mean position of one face to the mean position of the other."""
+def _angle_between(low: Face, high: Face, axis: Axis, reach: float) -> float:
+    """Return the angle about the axis from one face to the other, rad.
+
+    It is that of nodes at equal radius and height where most have such a partner, else that of the mean positions.
+    """
     if not (len(low.node) and len(high.node)):
         return 0.0
-    a, b = (axis.arm(low.position.mean(axis=0)[None])[0], axis.arm(high.position.mean(axis=0)[None])[0])
-    return math.atan2(float(axis.unit @ np.cross(a, b)), float(a @ b))
+    arms = [axis.arm(side.position) for side in (low, high)]
+    flat = [
+        np.column_stack([np.linalg.norm(arm, axis=1), side.position @ axis.unit])
+        for arm, side in zip(arms, (low, high), strict=True)
+    ]
+    distance, partner = _nearest(flat[0], flat[1])
+    here = np.flatnonzero(distance <= reach)
+    a, b = arms[0][here], arms[1][partner[here]]
+    if here.size < FEW_UNMATCHED_SHARE * min(len(low.node), len(high.node)):
+        a, b = (arm.mean(axis=0)[None] for arm in arms)
+    return float(np.median(np.arctan2(np.cross(a, b) @ axis.unit, np.sum(a * b, axis=1))))
 
 
 def _other_components(low: Face, high: Face, here: int, there: int) -> InputError:
@@ -447,10 +486,20 @@ def cyclic_sector(
     """
     check_sectors("cyclic_sector", sectors)
     faces = [face(structure.dofs, structure.dof_set(name), name) for name in (low, high)]
-    pairs = pair_faces(faces[0], faces[1], sectors, axis, tolerance)
+    others = (
+        face(structure.dofs, members, name) for name, members in structure.sets.items() if _of_nodes(structure, members)
+    )
+    pairs = pair_faces(faces[0], faces[1], sectors, axis, tolerance, others)
     if sectors > 1:
         refuse_torn_axis(structure.dofs, pairs, axis)
     return CyclicSector(structure, sectors, *pairs, axis)
+
+
+def _of_nodes(structure: Structure, members: IntArray) -> bool:
+    """Return whether a set holds components of nodes with positions, each once."""
+    here = structure.dofs.take(members)
+    known = bool(np.all(np.isfinite(here.position)))
+    return known and np.count_nonzero(node_table(here) >= 0) == members.size > 0
 
 
 def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:

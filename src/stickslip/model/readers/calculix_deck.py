@@ -455,6 +455,45 @@ def _met(mesh: SolidMesh, faces: tuple[IntArray, IntArray], axis: Axis, pitch: f
     return replace(mesh, points=points)
 
 
+def held_like_partners(deck: Deck, faces: tuple[IntArray, IntArray], axis: Axis, sectors: int) -> Deck:
+    """Return the deck with supports of one cyclic face transferred to the other, as those of a deck with a cyclic tie are.
+
+    Parameters
+    ----------
+    deck
+        A deck without a cyclic tie.
+    faces
+        Nodes of the low and of the high face, indices into the points of the mesh; supported nodes may be left out.
+    axis, sectors
+        Axis of the wheel and its number of sectors.
+
+    Raises
+    ------
+    InputError
+        If supports of partners differ after a turn.
+    """
+    from scipy.spatial import cKDTree
+
+    mesh, pitch = deck.mesh, 2 * math.pi / sectors
+    low, high = faces
+    held = np.flatnonzero(deck.held.any(axis=1))
+    if not (held.size and low.size and high.size):
+        return deck
+    reach = PAIRED * float(np.ptp(mesh.points[high], axis=0).max())
+    opposite = [
+        held[cKDTree(mesh.points[side]).query(axis.turned(mesh.points[held], angle))[0] <= reach]
+        for side, angle in ((high, pitch), (low, -pitch))
+    ]
+    both = np.union1d(low, opposite[0]), np.union1d(high, opposite[1])
+    supports = _held_by_tie(mesh, deck.held, both, axis, pitch)
+    root = supports.min(axis=1)
+    sets = {name: nodes[~root[nodes]] for name, nodes in mesh.node_sets.items() if name != "root"}
+    if root.any():
+        sets["root"] = np.flatnonzero(root)
+    kept = {name: nodes for name, nodes in sets.items() if nodes.size}
+    return replace(deck, mesh=replace(mesh, node_sets=kept), held=supports)
+
+
 def _held_by_tie(
     mesh: SolidMesh, held: BoolArray, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float
 ) -> BoolArray:

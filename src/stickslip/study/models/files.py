@@ -24,7 +24,7 @@ from stickslip.model.readers.ansys_archive import (
     read_ansys_archive,
     read_ansys_materials,
 )
-from stickslip.model.readers.calculix_deck import Deck, read_deck
+from stickslip.model.readers.calculix_deck import Deck, held_like_partners, read_deck
 from stickslip.model.readers.open_model import read_structure, refuse_other_models
 from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
@@ -196,6 +196,10 @@ def _units(table: FileModel) -> Units:
 def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]) -> Part:
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
+    if deck.sectors is None and sectors > 1 and table.cyclic == "node_to_node":
+        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.node_sets)
+        low, high = (sets[name] for name in _faces(key, table, sets, sectors))
+        deck = held_like_partners(deck, (low, high), table.axis() or deck.axis, sectors)
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
     part = _solid(
         key,
@@ -299,7 +303,15 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     return solid_part(
-        free, material, axis, sectors=sectors, faces=faces, cyclic=_tied(table), clamped_sets=gone, **others
+        free,
+        material,
+        axis,
+        sectors=sectors,
+        faces=faces,
+        cyclic=_tied(table),
+        clamped_sets=gone,
+        alone=table.sectors == 1 or not table.plausible,
+        **others,
     )
 
 

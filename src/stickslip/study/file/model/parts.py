@@ -184,7 +184,7 @@ class FileModel(PartTable):
     )
     plausible: bool = Field(
         True,
-        description="whether mass and size are checked against what solids have: true, or false where the numbers are right",
+        description="whether mass and size are checked against what solids have, and faces that would meet neighbouring sectors against ties and contacts: true, or false where the model is right",
     )
     sectors: int | None = Field(
         None,
