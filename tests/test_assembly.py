@@ -25,7 +25,7 @@ from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.part import damper_part, solid_part, structure_part
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
-from stickslip.model.structure import join
+from stickslip.model.structure import Dofs, Structure, join
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, accepted_points, forced_problem, forced_response
@@ -258,3 +258,23 @@ def test_what_is_wrong_with_a_model_is_named():
 def test_words_that_are_none_are_refused_with_those_that_are(make, said):
     with pytest.raises(ss.InputError, match=said + r"\. Give one of "):
         make()
+
+
+@pytest.mark.parametrize(("nodes", "names"), [((3,), ("brake", "pad")), ((2, 3), ("brake", "pad.1", "pad.2"))])
+def test_a_contact_of_one_point_names_it_as_the_study_names_the_contact(nodes, names):
+    """Between dofs and between nodes alike; `data.sel(contact="pad")` had ended in a KeyError, since the point was "pad.1"."""
+    number = np.array([1, 2, 2, 3, 3])
+    place = np.column_stack([number, np.zeros(5), np.zeros(5)]).astype(float)
+    dofs = Dofs(number, ("x", "x", "z", "x", "z"), place)
+    sets = {"m1": np.array([0]), "face": np.flatnonzero(np.isin(number, nodes))}
+    part = structure_part(Structure(np.eye(5), np.zeros((5, 5)), 1e4 * np.eye(5), dofs, sets))
+    law = ElasticCoulomb(k_t=1e3, k_w=0.0, k_n=1e3, mu=0.3)
+    model = Model(
+        parts={"chain": part},
+        contacts={
+            "brake": Contact(between=("chain.m1", "ground"), law=Jenkins(k_t=1e3, limit=1.0), acts="tangential"),
+            "pad": Contact(between=("chain.face", "ground"), law=law, normal=(0, 0, 1), tangent=(1, 0, 0), preload=1.0),
+        },
+    )
+    assert model.pairs.names == names
+    assert model.pairs.groups == ("brake", *("pad",) * len(nodes))

@@ -161,7 +161,7 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
     area = pairing.weights if has_area else np.full(p, np.nan)
     area = area if first.area is None else first.area
     refuse_held(key, operator)
-    labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
+    labels = first.labels if len(first.labels) == p else _numbered(name, p)
     rims = (text for side in (first, second) if side for text in rim_warning(places, key, side))
     warnings = (*said, *rims, *flat_warning(key, operator, law))
     if contact.pairing != "node_to_node" and len(first.surface.facets):
@@ -181,6 +181,11 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
         _nodes(places, contact, first, operator[:, :n]),
         warnings,
     )
+
+
+def _numbered(name: str, points: int) -> tuple[str, ...]:
+    """Return names of the points of a contact: its own for a single point, else with a number each."""
+    return (name,) if points == 1 else tuple(f"{name}.{i + 1}" for i in range(points))
 
 
 def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArray:
@@ -358,7 +363,7 @@ def _single_dofs(
     own, theirs = rows(one, -1.0), rows(two, 1.0)
     if turn is not None and second is not None:
         theirs = theirs @ _turned_dofs(places, key, second.part, turn)
-    names = (name,) if p == 1 else tuple(f"{name}.{i + 1}" for i in range(p))
+    names = _numbered(name, p)
     area = np.full(p, np.nan)
     return Pairs(
         own if turn is not None else own + theirs,
