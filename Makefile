@@ -116,7 +116,7 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 trust: $(INSTALLED)  ## hold what a response trusts on random machines against a judge of its own (SEED=1 SYSTEMS=60, ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.trust --seed $(or $(SEED),1) --systems $(or $(SYSTEMS),60) --workers $(WORKERS)
 
-mutants: $(INSTALLED)  ## change the library in one point, N=40 times, and list the changes that no test notices (SEED of the day; half an hour of recording the first time)
+mutants: $(INSTALLED)  ## change the library in one point, N=40 times, and list the changes that no test notices (SEED of the day; the first time all tests run once more)
 	$(ONE_THREAD) $(BIN)/python -m evidence.mutants --n $(or $(N),40) --seed $(or $(SEED),$(shell date +%Y%m%d)) --workers $(WORKERS)
 
 calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)

@@ -1,13 +1,16 @@
 """The mutants of `evidence.mutants` on a package of ten lines: what a test sees is noticed, what nothing can see survives, a seed draws the same."""
 
+import ast
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from evidence.mutants.__main__ import judged, key, told
 from evidence.mutants.judge import Copy
 from evidence.mutants.points import Mutant, drawn, is_another, mutants_of
+from evidence.mutants.probes import MARKS, probe
 from evidence.mutants.reach import Reach, names_of, record
 
 SOURCE = '''"""A package."""
@@ -39,15 +42,42 @@ def twice(x):
 
 FIRST = ("a", "b", "c")[7 % 3]
 '''
-TESTS = """from stickslip.small import clipped, twice
+TESTS = """import subprocess
+import sys
+from functools import cache
+
+import pytest
+from stickslip.small import clipped, twice
+
+
+@cache
+def least():
+    return clipped([1, 2, 3])
+
+
+@pytest.fixture(scope="module")
+def doubled():
+    return twice(3)
 
 
 def test_clipped():
-    assert clipped([1, 2, 3]) == 1
+    assert least() == 1
 
 
-def test_twice():
-    assert twice(3) == 6
+def test_cached():
+    assert least() == 1
+
+
+def test_twice(doubled):
+    assert doubled == 6
+
+
+def test_shared(doubled):
+    assert doubled == 6
+
+
+def test_started():
+    subprocess.run([sys.executable, "-c", "from stickslip.small import twice; assert twice(3) == 6"], check=True)
 """
 
 
@@ -94,6 +124,42 @@ def test_names_lead_from_compiled_functions_and_constants_to_lines_that_run() ->
     assert [line for _, line, _ in names.lines["LIMIT"]] == [17]
 
 
+def test_each_line_that_runs_belongs_to_the_head_of_its_block() -> None:
+    source = """X = 1 + 2
+
+
+def f(a):
+    \"\"\"Say.\"\"\"
+    b = (
+        a
+    )
+    if b > 0:
+        b += 1
+    elif b:
+        return 0
+    for _ in range(2):
+        b += 1
+        b += 1
+    return b
+
+
+@njit
+def g(a):
+    return a
+"""
+    tree = ast.parse(source)
+    assert probe(tree, 100) == {6: 6, 7: 6, 8: 6, 9: 6, 10: 10, 11: 11, 12: 12, 13: 13, 14: 14, 15: 14, 16: 16}
+    marks: dict[int, int] = {}
+    known: dict[str, Any] = {MARKS: marks, "njit": lambda function: function}
+    exec(compile(tree, "f", "exec"), known)
+    assert not marks
+    assert known["f"](1) == 6
+    assert known["f"].__doc__ == "Say."
+    assert sorted(marks) == [106, 110, 113, 114, 116]
+    assert known["g"](3) == 3
+    assert sorted(marks) == [106, 110, 113, 114, 116]
+
+
 def mutant_of(source: str, before: str, after: str) -> Mutant:
     (one,) = [m for m in mutants_of("small.py", source) if (m.before, m.after) == (before, after)]
     return one
@@ -119,7 +185,9 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
     (package / "small.py").write_text(source)
     sources = {"__init__.py": "", "small.py": source}
     reach = Reach(tmp_path / "cache", sources, {"tests/test_small.py": TESTS})
-    one, other = ("tests/test_small.py::test_" + n for n in ("clipped", "twice"))
+    one, cached, other, shared, started = (
+        "tests/test_small.py::test_" + n for n in ("clipped", "cached", "twice", "shared", "started")
+    )
     wanted = {
         ("len(kept) > 0", "len(kept) >= 0"): (one, ""),  # no test has an empty list
         ("v < LIMIT", "v >= LIMIT"): (one, one),
@@ -131,7 +199,8 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
     try:
         for (before, after), (reached, by) in wanted.items():
             mutant = mutant_of(source, before, after)
-            assert reach.tests(mutant) == {reached}, before
+            # what a cached function, a fixture of several tests or a process has run counts for each test that uses it
+            assert reach.tests(mutant) == ({one, cached} if reached == one else {other, shared, started}), before
             found = copy.judge(mutant, [reached], 1.0, 1)
             assert found.by == by, before
             assert (copy.package / "small.py").read_text() == source
@@ -140,7 +209,7 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
             assert by or (f"+        {after}" in text.replace("return ", "") or key(mutant) in text)
         assert copy.passes(one, 1.0)
         monkeypatch.undo()
-        assert copy.collected() == {one, other}
+        assert copy.collected() == {one, cached, other, shared, started}
         # a mutant with which the module cannot be imported is noticed, though no test of it has failed
         broken = judged(copy, reach, mutant_of(source, "7 % 3", "((7) * (3))"), 10.0)
         assert broken.by.startswith("pytest cannot begin")

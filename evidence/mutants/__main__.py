@@ -1,7 +1,7 @@
 """Draw mutants and print those that no test notices: ``python -m evidence.mutants --n 40 --seed 1``.
 
-Which tests reach which line is recorded first, once for each test file that is new or has changed (half an hour for all). The command
-fails if fewer than 95 of 100 mutants are noticed; those that `equivalent.txt` lists change nothing that can be seen, and are not counted.
+Which tests reach which line is recorded first, once for each test file that is new or has changed: all take about as long as `make test`.
+The command fails if fewer than 95 of 100 mutants are noticed; those that `equivalent.txt` lists change nothing that can be seen, and are not counted.
 """
 
 import argparse

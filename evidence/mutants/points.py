@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from evidence.mutants.probes import own_lines
+
 # what decides a number before anybody words it
 CORE = ("contact", "harmonic", "solve", "reduction", "response", "model/fe")
 COMPARED: Mapping[type[ast.cmpop], tuple[str, ...]] = {
@@ -142,7 +144,8 @@ class _Finder:
     def walk(self, node: ast.AST, place: _Place) -> None:
         """Collect the mutants of a node and of those inside it."""
         if isinstance(node, ast.stmt):
-            place = _Place(place.where, place.about, _own_lines(node))
+            first, end = own_lines(node)
+            place = _Place(place.where, place.about, (first, end - 1))
         for after, kind, own in _changes(node, self.text):
             self.add(place, own, after, kind)
         for child, where in _inside(node, place):
@@ -162,15 +165,6 @@ def _inside(node: ast.AST, place: _Place) -> Iterator[tuple[ast.AST, _Place]]:
         yield from ((own, place) for own in [node.value] if own is not None)
     elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
         yield from ((own, place) for own in ast.iter_child_nodes(node))
-
-
-def _own_lines(node: ast.stmt) -> tuple[int, int]:
-    """Return first and last line of a statement without those that it holds."""
-    last = node.end_lineno or node.lineno
-    body = getattr(node, "body", None)
-    if body and isinstance(body, list):
-        last = max(node.lineno, body[0].lineno - 1)
-    return node.lineno, last
 
 
 def _changes(node: ast.AST, text: Any) -> Iterator[tuple[str, str, ast.expr]]:

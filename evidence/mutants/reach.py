@@ -1,32 +1,28 @@
 """Which tests reach a line: recorded once, read for any later state of the sources.
 
+Each block of the package tells by a mark that a test has run it (`probes`), in the test's own process or in one that it starts.
 Test files that were not recorded as they are now are taken whole, where they name what is mutated or import its module.
-Lines that run at import are looked at by the tests of all pages and tables as well, before others. Lines of compiled functions are reached by the tests that reach a line which names the function, and so are lines that run at import:
-what they define is what is named. A line that is new since the recording is reached by the tests of its neighbours.
+Lines of compiled functions are reached by the tests that reach a line which names the function, and so are lines that run
+at import: what they define is what is named. Tests of all pages and tables look at the latter, too, before others.
+A line that is new since the recording is reached by the tests of its neighbours.
 """
 
 import ast
 import difflib
-import hashlib
 import json
 import os
 import re
-import shutil
-import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from coverage.numbits import numbits_to_nums
-
-from evidence.mutants.points import Mutant
-from evidence.mutants.recorder import WHERE
+from evidence.mutants.points import Mutant, sources_of
+from evidence.mutants.probes import WHERE, compiled_in, probe, sum_of
 
 PIECE = 8  # test files a process
 PER_PIECE_S = 3000.0  # of the clock
@@ -52,7 +48,7 @@ def record(root: Path, cache: Path, workers: int = 1) -> None:
     workers
         Processes at a time.
     """
-    cache.mkdir(parents=True, exist_ok=True)
+    (cache / "sources").mkdir(parents=True, exist_ok=True)
     known = {(file, sum_) for piece in _pieces(cache) for file, sum_ in piece["files"].items()}
     to_do = [
         file
@@ -68,20 +64,24 @@ def record(root: Path, cache: Path, workers: int = 1) -> None:
 def _record(root: Path, cache: Path, files: Sequence[Path]) -> list[str]:
     """Record some test files, with the sources as they are, and return their names."""
     sums = {f"tests/{file.name}": _digest(file) for file in files}
-    where = cache / f"piece_{_sum(repr(sums).encode())[:12]}"
-    _run(root, where, list(sums))
-    shutil.copytree(
-        root / "src" / "stickslip",
-        where.with_suffix(".src"),
-        ignore=shutil.ignore_patterns("__pycache__"),
-        dirs_exist_ok=True,
-    )
-    said = json.loads(where.with_suffix(".json").read_text(encoding="utf-8"))
-    where.with_suffix(".json").write_text(json.dumps(said | {"files": sums}), encoding="utf-8")
+    where = cache / f"piece_{sum_of(repr(sums).encode())[:12]}"
+    package = root / "src" / "stickslip"
+    sources = sources_of(package)
+    first, places = {}, 0
+    for path, text in sources.items():
+        first[path] = places
+        places += text.count("\n") + 2
+        (cache / "sources" / sum_of(text.encode())).write_text(text, encoding="utf-8")
+    where.with_suffix(".marks").write_bytes(bytes(places))
+    firsts = {str(package / path): own for path, own in first.items()}
+    where.with_suffix(".first").write_text(json.dumps(firsts), encoding="utf-8")
+    said = _run(root, where.with_suffix(".marks"), list(sums))
+    own = {path: {"first": first[path], "sum": sum_of(text.encode())} for path, text in sources.items()}
+    where.with_suffix(".json").write_text(json.dumps(said | {"files": sums, "sources": own}), encoding="utf-8")
     return list(sums)
 
 
-def _run(root: Path, where: Path, files: Sequence[str]) -> None:
+def _run(root: Path, marks: Path, files: Sequence[str]) -> dict[str, Any]:
     command = [
         sys.executable,
         "-m",
@@ -94,7 +94,9 @@ def _run(root: Path, where: Path, files: Sequence[str]) -> None:
         "-p",
         "evidence.mutants.recorder",
     ]
-    paths = os.pathsep.join([str(root / "src"), str(root)])
+    said = Path(f"{marks}.said")
+    said.unlink(missing_ok=True)
+    paths = os.pathsep.join([str(Path(__file__).with_name("start")), str(root / "src"), str(root)])
     done = subprocess.run(
         [*command, *files],
         cwd=root,
@@ -102,28 +104,24 @@ def _run(root: Path, where: Path, files: Sequence[str]) -> None:
         capture_output=True,
         text=True,
         timeout=PER_PIECE_S,
-        env=os.environ | {"PYTHONPATH": paths, WHERE: str(where)},
+        env=os.environ | {"PYTHONPATH": paths, WHERE: str(marks)},
     )
-    if not where.with_suffix(".json").exists():
-        raise RuntimeError(f"pytest recorded nothing of {', '.join(files)}: {done.stdout[-2000:]}")
+    if not said.exists():
+        raise RuntimeError(f"pytest recorded nothing of {', '.join(files)}: {(done.stdout + done.stderr)[-2000:]}")
+    found: dict[str, Any] = json.loads(said.read_text(encoding="utf-8"))
+    for left in (marks, marks.with_suffix(".first"), said):
+        left.unlink()
+    return found
 
 
 def _digest(file: Path) -> str:
-    return _sum(file.read_bytes())
-
-
-def _sum(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+    return sum_of(file.read_bytes())
 
 
 def _pieces(cache: Path) -> list[dict[str, Any]]:
     """Return what was recorded, oldest first."""
-    found = []
-    for file in sorted(cache.glob("piece_*.json"), key=lambda f: f.stat().st_mtime):
-        said = json.loads(file.read_text(encoding="utf-8"))
-        if "files" in said:
-            found.append(said | {"data": file.with_suffix("")})
-    return found
+    files = sorted(cache.glob("piece_*.json"), key=lambda f: f.stat().st_mtime)
+    return [json.loads(file.read_text(encoding="utf-8")) | {"data": file} for file in files]
 
 
 @dataclass(frozen=True)
@@ -142,8 +140,9 @@ class Names:
 
 
 class _Reader(ast.NodeVisitor):
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, compiled_names: set[str]) -> None:
         self.path = path
+        self.compiled_names = compiled_names
         self.inside: tuple[str, str, bool] | None = None
         self.lines: list[tuple[str, int, tuple[str, str, bool] | None]] = []
         self.defined: dict[tuple[str, int], str] = {}
@@ -151,7 +150,7 @@ class _Reader(ast.NodeVisitor):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         outer = self.inside
-        compiled = any("njit" in ast.unparse(d) or "cfunc" in ast.unparse(d) for d in node.decorator_list)
+        compiled = node.name in self.compiled_names
         if outer is None or compiled:
             self.inside = (self.path, node.name, compiled)
         if compiled:
@@ -194,8 +193,9 @@ def names_of(sources: Mapping[str, str]) -> Names:
     defined: dict[tuple[str, int], str] = {}
     compiled: dict[tuple[str, int], str] = {}
     for path, source in sources.items():
-        reader = _Reader(path)
-        reader.visit(ast.parse(source))
+        tree = ast.parse(source)
+        reader = _Reader(path, compiled_in(tree))
+        reader.visit(tree)
         for name, line, inside in reader.lines:
             lines.setdefault(name, []).append((path, line, inside))
         defined |= reader.defined
@@ -215,11 +215,14 @@ class Reach:
         Sources as they are now, by path below the package's folder.
     tests_as_they_are
         Text of each test file as it is now, by its path below the root.
+    failed
+        Tests that are known to fail without any mutant.
     """
 
     cache: Path
     sources: Mapping[str, str]
     tests_as_they_are: Mapping[str, str]
+    failed: set[str] = field(default_factory=set)
     _known: dict[str, dict[int, set[str]]] = field(default_factory=dict)
 
     @cached_property
@@ -231,11 +234,6 @@ class Reach:
             for t, s in piece["cpu_s"].items()
             if self._valid.get(t.partition("::")[0]) == piece["data"]
         }
-
-    @cached_property
-    def failed(self) -> set[str]:
-        """Tests that fail without any mutant."""
-        return {t for piece in self.pieces for t in piece["failed"]}
 
     @cached_property
     def pieces(self) -> list[dict[str, Any]]:
@@ -250,7 +248,7 @@ class Reach:
     @cached_property
     def _valid(self) -> dict[str, Path]:
         """For each test file the last piece that holds it as it is now."""
-        now = {file: _sum(text.encode()) for file, text in self.tests_as_they_are.items()}
+        now = {file: sum_of(text.encode()) for file, text in self.tests_as_they_are.items()}
         return {
             file: piece["data"] for piece in self.pieces for file, own in piece["files"].items() if now.get(file) == own
         }
@@ -260,27 +258,26 @@ class Reach:
         if path not in self._known:
             found: dict[int, set[str]] = {}
             for piece in self.pieces:
-                own = self._of_piece(piece["data"], path)
+                own = self._of_piece(piece, path)
                 for line, tests in own.items():
                     found.setdefault(line, set()).update(tests)
             self._known[path] = found
         return self._known[path]
 
-    def _of_piece(self, data: Path, path: str) -> dict[int, set[str]]:
-        found: dict[int, set[str]] = {}
-        with closing(sqlite3.connect(f"file:{data}?mode=ro", uri=True)) as base:
-            rows = base.execute(
-                "select context.context, line_bits.numbits from line_bits join file on file.id = file_id "
-                "join context on context.id = context_id where file.path like ? and context.context != ''",
-                (f"%/src/stickslip/{path}",),
-            ).fetchall()
-        for test, bits in rows:
-            if self._valid.get(test.partition("::")[0]) == data:
-                for line in numbits_to_nums(bits):
-                    found.setdefault(line, set()).add(test)
-        old = data.with_suffix(".src") / path
-        before = old.read_text(encoding="utf-8") if old.exists() else ""
-        return found if before == self.sources[path] else _moved(found, before, self.sources[path])
+    def _of_piece(self, piece: Mapping[str, Any], path: str) -> dict[int, set[str]]:
+        own = piece["sources"].get(path)
+        if own is None:
+            return {}
+        now = self.sources[path]
+        before = now
+        if own["sum"] != sum_of(now.encode()):
+            before = (self.cache / "sources" / own["sum"]).read_text(encoding="utf-8")
+        valid = {k: t for k, t in enumerate(piece["tests"]) if self._valid.get(t.partition("::")[0]) == piece["data"]}
+        found = {}
+        for line, head in probe(ast.parse(before)).items():
+            bits = int(piece["places"].get(str(own["first"] + head), "0"), 16)
+            found[line] = {t for k, t in valid.items() if bits >> k & 1}
+        return found if before == now else _moved(found, before, now)
 
     def tests(self, mutant: Mutant) -> set[str]:
         """Return the tests that reach a mutant; of files that are not recorded as they are now, whole files that may."""
