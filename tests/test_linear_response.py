@@ -79,6 +79,10 @@ def test_an_undamped_response_without_contacts_is_wrong_and_says_why() -> None:
     assert "wrong" in found.conclusion
     (told,) = [v.why for v in found.verdicts if v.level == "wrong"]
     assert told.startswith("nothing damps the mode at 0.16 Hz: the peak has no finite value")
+    assert [v.why for v in found.verdicts if v.level != "trusted"] == [
+        told
+    ]  # the jump to the resonance had been told as another motion
+    assert not any("neutral" in v.why for v in found.verdicts)
 
 
 def test_steps_as_wide_as_a_resonance_are_doubted() -> None:

@@ -92,6 +92,7 @@ def test_a_misspelt_key_is_told_and_not_what_it_stands_for(right, wrong, said, t
     text = (EXAMPLES / "sector_deck" / "study.toml").read_text(encoding="utf-8")
     assert right in text
     path.write_text(text.replace(right, wrong), encoding="utf-8")
+    (tmp_path / "sector.inp").touch()  # a missing file would be told, too
     with pytest.raises(InputError) as error:
         read_study(path)
     told = str(error.value)

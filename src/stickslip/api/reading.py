@@ -30,12 +30,9 @@ def read(path: Path, tell: Callable[[str], None] | None = None, *, allow_code: b
 
     one_blas_thread()
     read_toml(path)
-    from stickslip.study.file.study import read_file
+    from stickslip.study.models.checked_file import checked_file
 
-    file = read_file(path, allow_code=allow_code)
-    from stickslip.study.models.checks import refuse
-
-    refuse(file)
+    file = checked_file(path, allow_code=allow_code)
     if tell is not None:
         from stickslip.study.models.beforehand import before_check
 

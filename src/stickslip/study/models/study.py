@@ -11,9 +11,10 @@ from typing import Any
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
 from stickslip.study.analysis import Case
-from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
+from stickslip.study.file.study import StudyFile, TablesOfCase, validated
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import refuse_varied, with_values
+from stickslip.study.models.checked_file import checked_file
 from stickslip.study.models.checks import refuse
 from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
@@ -193,7 +194,7 @@ def read_study(path: Path, *, allow_code: bool = False) -> Study:
     InputError
         If the file has errors; the message names each on a line.
     """
-    return _checked(Study(read_file(path, allow_code=allow_code)))
+    return judged(checked_file(path, allow_code=allow_code))
 
 
 def _drive(tables: Tables) -> float:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.analyses.forced_response.chooser import error_text
+from stickslip.analyses.forced_response.physics.limits import GIVE_DAMPING
 from stickslip.analyses.forced_response.problem import ALONE, MORE_THAN_LOW, MOST_IN_TIME, TOO_MANY
 from stickslip.analyses.forced_response.records.columns import (
     MOTION,
@@ -93,7 +94,7 @@ def stability(case: Curve) -> Iterator[Finding]:
             why = f"a machine does not stay there: {why}"
             remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."
             yield Finding("wrong", why, remedy, (point,))
-        elif word == "neutral" and point == case.peak:
+        elif word == "neutral" and point == case.peak and not lacks_damping(case):
             remedy = "Damping decides whether a machine keeps this motion: give [damping], or a contact that slips."
             yield Finding("trusted", f"the peak is {why}", remedy, (point,))
         elif word == "undecided" and not case.attained[point] and point not in case.known:
@@ -386,13 +387,23 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]), told)
 
 
+def lacks_damping(case: Curve) -> bool:
+    """Return whether a verdict on the physics of the case says that damping is missing."""
+    told = from_json(case.read(PhysicsVerdicts).physics_verdicts or "[]")
+    return any(v.level != "trusted" and v.remedy.startswith(GIVE_DAMPING) for v in told)
+
+
 def on_other_motions(case: Curve) -> Iterator[Finding]:
     """Note neighbouring points on different motions; doubt them at the peak, and if either is not known to be stable with enough harmonics."""
     at = case.branch[case.converged[case.branch]]
     if case.stepped or at.size < 2:  # neighbouring listed frequencies may have any ratio of amplitudes
         return
+    if not case.data.sizes.get("contact", 0):
+        return  # linear: one motion at each frequency
     for jump in jumps(case.amplitude[at], case.dissipation[at], case.few[at], case.elastic):
         i, j = int(at[jump.step]), int(at[jump.step + 1])
+        if case.peak in (i, j) and lacks_damping(case):
+            continue  # missing damping is told, and the size of the peak is no other motion
         kept = case.kept[i], case.kept[j]
         sure = case.peak not in (i, j) and case.sure[i] and case.sure[j]
         unlike = "" if sure or kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
