@@ -36,6 +36,7 @@ def griffin(omega: float, stepping: TimeStepping) -> TransientResult:
     return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("omega", GRIFFIN_EXACT)
 def test_friction_damped_oscillator_against_exact_event_driven_values(omega: float) -> None:
     result = griffin(omega, TimeStepping(steps_per_period=2048, tolerance=1e-8))
@@ -74,6 +75,7 @@ def bounce(steps: int) -> float:
     return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
 
 
+@pytest.mark.validation
 def test_bouncing_mass_follows_parabola_and_half_sine() -> None:
     # Closed form over two landings; an error in a landing would shift all that comes after it.
     errors = np.array([bounce(n) for n in (250, 1000, 4000)])
@@ -81,6 +83,7 @@ def test_bouncing_mass_follows_parabola_and_half_sine() -> None:
     assert np.all(errors[1:] < errors[:-1] / 8)  # second order would be 16, at unlucky phases less
 
 
+@pytest.mark.validation
 def test_refinement_reports_an_error_that_covers_the_true_one() -> None:
     law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
     structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
@@ -93,6 +96,7 @@ def test_refinement_reports_an_error_that_covers_the_true_one() -> None:
         assert true <= refined.error < 1e-3
 
 
+@pytest.mark.validation
 def test_refinement_of_an_unsettled_motion_does_not_extrapolate_and_widens_its_error() -> None:
     structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
     load, stepping = load_of(1, {1: [0.1]}), TimeStepping(steps_per_period=32, max_periods=12)
@@ -102,6 +106,7 @@ def test_refinement_of_an_unsettled_motion_does_not_extrapolate_and_widens_its_e
     assert refined.error >= refined.coarse.scatter + refined.fine.scatter > 0.0
 
 
+@pytest.mark.validation
 def test_contact_equations_without_a_solution_are_counted_as_failed() -> None:
     structure = structure_of(np.eye(1), np.zeros((1, 1)), np.eye(1))
     gap = np.array([[0.0], [0.0], [1.0]])

@@ -67,6 +67,7 @@ def test_integration_over_compiled_laws_agrees(name):
     assert np.max(np.abs(found.harmonics - limit)) < 2e-4 * np.max(np.abs(limit[1]))
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(
     ("ratio", "exact"), [(r, complex(1.0 / r**2, np.sqrt(1.0 - 1.0 / r**2) / r)) for r in (1.5, 2.0, 5.0)]
 )
@@ -83,6 +84,7 @@ def test_planar_slider_on_a_circle_is_the_closed_form(ratio, exact):
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
 
 
+@pytest.mark.validation
 def test_a_planar_slider_at_its_limit_that_does_not_move_stays():
     kind, table, states = contact_table([CoupledCoulomb(k_t=1.0, k_n=0.0, mu=1.0, preload=1.0)])
     force, here = np.zeros(3), np.array([0.3, 0.4, 0.0])
@@ -92,6 +94,7 @@ def test_a_planar_slider_at_its_limit_that_does_not_move_stays():
         np.testing.assert_allclose(force, [0.6, 0.8, -1.0], atol=1e-14)
 
 
+@pytest.mark.validation
 def test_equal_stiffnesses_are_isotropic_and_turn_with_the_plane():
     rng = np.random.default_rng(3)
     gaps = np.cumsum(rng.standard_normal((300, 3)) * [0.3, 0.3, 0.1], axis=0)
@@ -108,6 +111,7 @@ def test_equal_stiffnesses_are_isotropic_and_turn_with_the_plane():
     np.testing.assert_allclose(marched(twice, gaps), one, atol=1e-12)
 
 
+@pytest.mark.validation
 def test_a_motion_that_it_has_settled_to_goes_on_from_its_final_state():
     found = judged(LAWS["Iwan"], 256)
     again = judged(LAWS["Iwan"], 256, start=found.final)

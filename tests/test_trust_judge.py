@@ -41,6 +41,7 @@ def test_a_slider_that_sticks_is_a_spring() -> None:
     assert found.multiplier == pytest.approx(np.exp(-0.1 * 2 * np.pi / omega), rel=1e-6)
 
 
+@pytest.mark.validation
 def test_a_slider_at_the_edge_of_the_places_at_which_it_sticks_is_a_spring() -> None:
     """It slips once as the load's mean begins to act, and then rests: slip to one side only is no property of the motion."""
     omega, spring = 1.7, 3.0
@@ -69,6 +70,7 @@ def test_the_multiplier_of_a_mass_between_stop_and_slider_has_the_error_that_is_
     assert abs(found.multiplier - exact.multiplier) <= 3.0 * found.multiplier_error + 1e-6
 
 
+@pytest.mark.validation
 def test_friction_takes_the_area_of_its_loop() -> None:
     """The load's work in a cycle is that of the dashpot and of 4 x limit x slip."""
     machine = one_mass(Contact("slider", ONE, 0 * ONE, stiffness=5.0, limit=0.3), 1.0)
@@ -84,6 +86,7 @@ def test_friction_takes_the_area_of_its_loop() -> None:
     assert work == pytest.approx(dashpot + 2 * 0.3 * slip, rel=2e-3)  # harmonics up to 5 alone
 
 
+@pytest.mark.validation
 def test_the_middle_branch_of_a_hardening_oscillator_is_unstable() -> None:
     """Three motions at one frequency: the middle one has a real multiplier above 1, the others do not."""
     machine = one_mass(Contact("cubic", ONE, 0 * ONE, stiffness=1.0), 0.3, damping=0.05)
@@ -155,6 +158,7 @@ def lifting_pad(omega: float) -> tuple[Machine, np.ndarray]:
     return machine, motion
 
 
+@pytest.mark.validation
 def test_a_landing_that_moves_in_time_counts_in_the_multipliers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A slider holds where its pad touches: the map of a period knows this from disturbances within a step as from those over many."""
     machine, motion = lifting_pad(1.7)
@@ -166,6 +170,7 @@ def test_a_landing_that_moves_in_time_counts_in_the_multipliers(monkeypatch: pyt
     assert narrow.multiplier == pytest.approx(wide.multiplier, abs=5e-3)  # 0.13 apart without
 
 
+@pytest.mark.validation
 def test_the_package_tells_the_multiplier_of_a_pad_that_lifts() -> None:
     """Two programs, one by balance and transitions, one by marching."""
     machine, motion = lifting_pad(1.7)
@@ -219,6 +224,7 @@ def test_machines_are_the_same_whenever_they_are_drawn() -> None:
     assert families == {"chain", "stop", "pad", "cubic"}
 
 
+@pytest.mark.validation
 def test_a_harmonic_that_meets_a_mode_beyond_the_judged_ones_is_kept() -> None:
     """Seed 118002, machine 15: five harmonics were kept, all up to the 15th judged, and the 16th takes 8.3 % off the first."""
     machine = draw(118002, 15)
