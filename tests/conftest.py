@@ -24,6 +24,24 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield started
 
 
+@pytest.fixture(scope="module")
+def peak_alone() -> Iterator[None]:
+    """Leave out the solutions beside the peak: more modes, fewer points, softer contacts, other motions, less retention.
+
+    They take a quarter of a small forced response. A module asks for this fixture if none of its tests looks at them;
+    `test_peak_trust`, `test_forced_records`, `test_contact_stiffness` and `test_verdicts` test them.
+    """
+    from stickslip.analyses.forced_response import analysis, problem
+    from stickslip.analyses.forced_response.physics.model_change import NO_SHIFT
+
+    with pytest.MonkeyPatch.context() as here:
+        here.setattr(analysis, "peak_shift", lambda *_: NO_SHIFT)
+        for name in ("model_changes", "stiffness_changes", "motions_elsewhere"):
+            here.setattr(analysis, name, lambda *_: {})
+        here.setattr(problem, "more_modes", lambda *_: None)
+        yield
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
     """Look for no garbage while tests are collected: what is made there stays, and to look through it takes a sixth of the time."""

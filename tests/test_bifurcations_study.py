@@ -18,6 +18,8 @@ from stickslip.response.forced.response import forced_response
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLE = Path(__file__).parents[1] / "examples" / "impacting_mass" / "study.toml"
 
 

@@ -14,6 +14,8 @@ from stickslip.model.readers.units import Units
 from stickslip.model.structure_file import save_structure
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 ROOT = Path(__file__).parents[1]
 CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
 

@@ -20,6 +20,8 @@ from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 from stickslip.study.store.netcdf import read_tree
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 CHAIN = """
 schema_version = 2
 title = "Two masses and a contact"

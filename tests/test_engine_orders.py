@@ -12,6 +12,8 @@ from stickslip.api.study import Study
 from stickslip.assembly.forces import engine_order
 from stickslip.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 SECTORS = 6
 # disk, blade and tip of a sector; shrouds rub and hit their neighbours, the root rubs in its slot
 MASSES, NAMES = [1.0, 0.5, 0.3], ["disk", "blade", "tip"]

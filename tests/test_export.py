@@ -39,6 +39,8 @@ from stickslip.study.exchange.chosen import chosen, point_of
 from stickslip.study.exchange.contacts import contacts_of
 from stickslip.study.exchange.motion import expanded, motion_of
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 CCX = Path(__file__).parent / "data" / "calculix" / "brick_static.frd"  # written by ccx 2.20
 BEAMS = """
 schema_version = 2

@@ -11,6 +11,8 @@ from test_cli import done
 from evidence.validation.case_b9_friction_ring import FREQUENCIES, HARMONICS
 from stickslip.api.result import Result
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLE = (EXAMPLES / "friction_ring" / "study.toml").read_text()
 SECTORS = 24
 DIGITS = 2e-6  # relative: the reference says how many digits it has; its samples and the weak spring are the rest

@@ -11,6 +11,8 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 MODEL = (
     CONTACT.format("node_to_segment").replace("interference_m = 1e-6\n", "")
     + """

@@ -18,6 +18,8 @@ from stickslip.errors import InputError
 from stickslip.study.file.study import read_file
 from stickslip.study.models.measured import measured_peaks
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 KEY = "load.shaker.force_n"
 FILE = f"""# rig 3
 {KEY},peak_amplitude_um,peak_amplitude_std_um,peak_frequency_hz,peak_frequency_half_width_hz,note

@@ -32,6 +32,8 @@ from stickslip.response.system import System
 from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLE = EXAMPLES / "own_blades"
 PULL, RATIO, APEX, DEG = 2000.0, 200.0, 0.3186346, math.pi / 180
 SECTIONS = (-0.0131, 0.0012, 0.0127)  # no point lies on an edge of a facet, where either neighbour would do

@@ -17,6 +17,8 @@ from stickslip.errors import InputError
 from stickslip.model.modes import lowest_modes
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLE = EXAMPLES / "own_matrices"
 FEW = {
     "forced_response.frequencies_hz": "[7.0, 8.0, 9.0, 9.5, 10.0, 10.5, 11.0, 12.0]",

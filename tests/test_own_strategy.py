@@ -9,6 +9,8 @@ import pytest
 import stickslip as ss
 from stickslip.analyses.page import report_html
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 

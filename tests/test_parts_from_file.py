@@ -19,6 +19,8 @@ from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 BEAM = """
 schema_version = 2
 [part.rod]

@@ -27,6 +27,8 @@ from stickslip.model.rigid.body import body_of_tensor
 from stickslip.study.models.study import read_study
 from stickslip.units import RPM
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 ORDER, H, PITCH = 2, 3, 2 * math.pi / SECTORS
 AXIS = Axis()
 OWN = {"damping": Damping(ratio=0.003, between_hz=(500.0, 3000.0))}

@@ -19,6 +19,8 @@ from stickslip.study.run import run_study
 from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.netcdf import one_case
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 KEYS = {
     "vary.load.shaker.force_n": "[2.0, 3.0, 5.0]",
     "forced_response.frequency_hz": "[11.0, 15.0]",

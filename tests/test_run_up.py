@@ -23,6 +23,8 @@ from stickslip.response.forced.response import Sweep, forced_problem, forced_res
 from stickslip.study.analysis import Case
 from stickslip.study.file.study import read_file
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 ORDER = 42  # wave 2 of five, at 2000 to 2300 Hz where the shrouds are pressed
 
 

@@ -16,7 +16,6 @@ from stickslip.analyses.forced_response import analysis
 from stickslip.analyses.forced_response.page.errors import errors
 from stickslip.analyses.forced_response.page.harmonics import choice, kept_harmonics
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.physics.model_change import NO_SHIFT
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet
@@ -28,6 +27,8 @@ from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.run import run_study
+
+pytestmark = pytest.mark.usefixtures("peak_alone")
 
 # a damper that slips around the peak, at few frequencies
 SLIPPING = {
@@ -58,12 +59,6 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Study:
     text = path.read_text(encoding="utf-8")
     path.write_text("\n".join(x for x in text.splitlines() if "vary" not in x and "ratio = [" not in x) + "\n")
     return read_study(path)
-
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    # following the peak with less retention costs more than all else here, and is not what is tested
-    monkeypatch.setattr(analysis, "peak_shift", lambda *_: NO_SHIFT)
 
 
 def changed(base: Study, harmonics: Mapping[str, object], folder: str, **sweep: object) -> Study:

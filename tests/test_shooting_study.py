@@ -21,6 +21,8 @@ from stickslip.response.forced.by_shooting import shooting_response
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 OFF: dict[str, Any] = {"peak_points": 0, "not_periodic": "off"}
 BALANCED: dict[str, Any] = {"selection": "always_high", "samples": 1024, "stability": "off"}

@@ -17,6 +17,8 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLE = Path(__file__).parents[1] / "examples" / "four_masses" / "study.toml"
 LISTED = [11.0, 13.55, 13.9, 14.1]  # Hz; all stick at the first
 RANGE = "frequency_hz = [8.0, 16.0]"

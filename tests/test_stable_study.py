@@ -58,6 +58,8 @@ from stickslip.study.analysis import Solved
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 
 def response_of(asked: Question) -> Response:
     points = list(forced_response(asked.model.system, asked.model.load, asked.sweep))

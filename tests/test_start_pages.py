@@ -14,6 +14,8 @@ from stickslip.cli import app
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.study.questions import ANALYSES
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
 

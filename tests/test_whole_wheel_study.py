@@ -27,6 +27,8 @@ from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 Vector = Sequence[float]
 AXIS, PITCH = Axis(), 2 * math.pi / SECTORS
 GAS, LEAN, STEADY = (0.2, 1.0, 0.3), (0.0, 1.0, 1.0), 300.0
