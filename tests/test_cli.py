@@ -37,6 +37,8 @@ from stickslip.study.store import threads
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import Interrupted
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 DOCS = Path(__file__).parents[1] / "docs"
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
 
@@ -185,7 +187,9 @@ def test_keys_without_a_table_of_their_own_are_told(name: str) -> None:
 
 
 # the other kinds are examples of the repository, which tests/test_journeys.py or others go through
-@pytest.mark.parametrize("kind", ["own_blades", "damper", "wheel", "mistuned"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("own_blades", marks=pytest.mark.validation), "damper", "wheel", "mistuned"]
+)
 def test_check_passes_what_new_writes(tmp_path: Path, kind: str) -> None:
     done("new", str(tmp_path / "made"), "--kind", kind)
     with_few_cases(tmp_path / "made" / "study.toml")
@@ -342,7 +346,7 @@ def test_two_blades_answer_and_can_be_read_without_this_package(
     monkeypatch.setattr(stickslip.cli, "MANY_CASES", 1)
     few = {"forced_response.points": "4", "forced_response.stability": '"off"', "reduction.fixed_interface_modes": "6"}
     path = write_two_blades(tmp_path, {"vary.load.shaker.ratio": "[2000, 1000]"} | few)
-    said = done("run", str(path), "--workers", "2")
+    said = done("run", str(path))
     assert "ratio 1000" in said
     assert "writing the page of 2 cases" in said
     page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
@@ -403,6 +407,7 @@ def test_a_deck_from_inspect_to_modes(tmp_path: Path) -> None:
     assert not (tmp_path / "results" / "report.html").exists()
 
 
+@pytest.mark.validation
 def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(tmp_path: Path) -> None:
     path = write_example_deck(tmp_path)
     said = done("run", str(path))

@@ -18,6 +18,8 @@ import stickslip as ss
 from stickslip.cli import app
 from stickslip.study import own_code
 
+pytestmark = pytest.mark.usefixtures("peak_alone")
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STUDY = """
 schema_version = 2
@@ -260,7 +262,7 @@ def test_a_law_from_a_file_answers_as_the_built_in_one_and_workers_find_it(tmp_p
     vary = ("\\[forced_response\\]", "[vary]\ncontact.friction.parameters.per_velocity = [0.0, 2.0]\n[forced_response]")
     study = write(own, events, law, vary)
     shutil.copy(EXAMPLES / "own_law.py", own)
-    done = invoke("run", study, "--allow-code", "--workers", "2", "--no-report")
+    done = invoke("run", study, "--allow-code", "--no-report")
     assert done.exit_code == 0, done.output
     sizes = ss.Result.from_file(own / "results")["forced_response"].peak_amplitude.values
     assert sizes[0] == pytest.approx(peak(usual), rel=1e-6)
