@@ -267,6 +267,7 @@ def impacting(y0, periods):
     return 2.0 * abs(np.mean(y[:-1] * np.exp(-1j * FAST * times[:-1])))
 
 
+@pytest.mark.validation
 def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
     system, load = stop()
     search = MotionSearch(
@@ -287,6 +288,7 @@ def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
 # ---- subharmonic isola -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.validation
 def test_the_third_order_subharmonic_isola_of_a_duffing_oscillator_is_found():
     # q'' + 4 q' + 1e4 q + 1e8 q³ = 100 cos Ωt: from 341.9 to 424.5 rad/s
     one, gap = np.ones((1, 1)), np.array([[1.0], [0.0], [0.0]])

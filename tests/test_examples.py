@@ -24,6 +24,7 @@ def test_readme_shows_the_example():
     assert len(shown.group(1).splitlines()) <= 16  # fifteen lines and a blank one
 
 
+@pytest.mark.validation
 def test_python_example_finds_the_damped_resonance(capsys):
     """On a coarser mesh, whose resonances lie lower: the peak is that of the blades stuck together, damped by friction."""
     text = EXAMPLE.read_text()
