@@ -150,6 +150,7 @@ def write(folder: Path, changes: dict[str, str]) -> Path:
     return path
 
 
+@pytest.mark.validation
 def test_the_example_sticks_at_its_stuck_frequency_and_thrown_out_it_presses(tmp_path: Path) -> None:
     keys = {"points": "6", "peak_points": "4", "stability": '"off"'}
     path = write(tmp_path, {f"forced_response.{key}": value for key, value in keys.items()})
