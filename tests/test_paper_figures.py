@@ -202,3 +202,43 @@ def test_the_command_writes_a_figure_and_lists_the_names(file: Path, tmp_path: P
     assert (code, ".pdf, .svg, .eps, .png" in told) == (2, True)
     code, told = invoke(str(file), "response", "--to", str(tmp_path / "none" / "fig.pdf"))
     assert (code, "cannot be written" in told) == (2, True)
+
+
+def boxes(paper):
+    """Return the extents of all visible labels of a figure."""
+    paper.draw_without_rendering()
+    renderer = paper.canvas.get_renderer()
+    return [note.get_window_extent(renderer) for axes in paper.axes for note in axes.texts if note.get_visible()]
+
+
+@pytest.mark.parametrize("apart", [400.0, 60.0, 10.0])
+def test_labels_of_curves_do_not_overlap_on_narrow_paper(apart):
+    """Nine lines with their names at the same speed, further and nearer than a label is high."""
+    x = np.linspace(0.0, 6000.0, 5)
+    figure = go.Figure()
+    for k in range(9):
+        own = {"text": [f"ND {k}: 1", "", "", "", ""], "textposition": "top right", "mode": "lines+markers+text"}
+        figure.add_scatter(x=x, y=np.full(5, 500.0 + apart * k), name=f"ND {k}", **own)
+    paper = draw(figure, "campbell", width=85 / 25.4)
+    found = boxes(paper)
+    assert len(found) == 9
+    assert not any(a.overlaps(b) for i, a in enumerate(found) for b in found[:i])
+    (axes,) = paper.axes
+    inside = axes.get_window_extent()
+    assert all(inside.x0 <= box.x0 and box.x1 <= inside.x1 for box in found)
+    lines = [line.get_transform().transform(np.column_stack(line.get_data())) for line in axes.lines]
+    crossed = sum(box.y0 < line[0, 1] < box.y1 for box in found for line in lines)
+    assert crossed == 0 or apart < 400.0  # a label rather lies on a line than on another label
+
+
+def test_texts_at_points_stand_where_the_page_puts_them_and_open_marks_are_drawn():
+    figure = go.Figure()
+    marks = {"symbol": ["square-open", "square-x-open"], "size": 8, "color": "#1c2530"}
+    places = {"text": [" EO 1 ", " EO 2 "], "textposition": ["bottom right", "middle left"], "marker": marks}
+    figure.add_scatter(x=[1.0, 2.0], y=[100.0, 200.0], mode="markers+text", **places)
+    (axes,) = draw(figure, "safe", width=85 / 25.4).axes
+    assert [(n.get_text(), n.get_ha(), n.get_va()) for n in axes.texts] == [
+        ("EO 1", "left", "top"),
+        ("EO 2", "right", "center"),
+    ]
+    assert all(one.get_linewidths()[0] > 0.5 for one in axes.collections)

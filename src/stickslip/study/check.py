@@ -66,7 +66,7 @@ def check_study(study: Study) -> tuple[str, ...]:
     if len(study.cases()) > 1 and solving_s[1] > 0.0:
         least, most = (f"{s / 60:.0f} min" if s >= 120.0 else f"{s:.0f} s" for s in solving_s)
         LOG.info(f"all {len(study.cases())} cases: {least} to {most} to solve on one core")
-        LOG.info(f"parts, stability, time integration and some {START_S:.0f} s to start come on top")
+        LOG.info(f"on top come parts, stability, audits, time integration and some {START_S:.0f} s to start")
     return told.doubts
 
 

@@ -29,6 +29,9 @@ SECONDS_AN_UNKNOWN = 3e-5
 # without condensation: 32 µs with 2000 contacts, 27 with 5000, with a new factorisation; 13 with a reused one in gross slip
 SECONDS_A_WHOLE_UNKNOWN = 4e-5
 BYTES_A_WHOLE_UNKNOWN = 2.5e3  # the sparse factor and the vectors of the Krylov method, 1000 to 5000 contacts, H = 5
+SECONDS_OF_DOUBTS = (
+    120.0  # estimated seconds, from counted steps, of integrating motions beside the peak in time; the bound of a case
+)
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 
 
@@ -50,8 +53,8 @@ class Estimate:
         Time on one core to mesh and reduce the parts and find their frequencies, s; cases with the same parts share it.
     least_seconds, most_seconds
         Time on one core to solve the response, s. Least: contacts hardly slip, and the fewest harmonics suffice at every point. Most:
-        contacts slip at every point, and the largest plausible number of points needs all harmonics. Stability and time integration are not
-        counted.
+        contacts slip at every point, and the largest plausible number of points needs all harmonics. Stability, audits and time
+        integration are not counted.
     most
         Assumption on harmonics behind `most_seconds`, in words; empty if their number is fixed.
     """
@@ -79,7 +82,8 @@ class Estimate:
             f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {least} to {most} s to solve this case",
             f"estimate: least if contacts hardly slip, most if all slip{many}",
             f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
-            f"estimate: stability and time integration come on top; limits.work_s is compared with {self.seconds:.0f} s",
+            f"estimate: on top come stability, audits and time integration, of doubted points up to some {SECONDS_OF_DOUBTS:.0f} s a case",
+            f"estimate: limits.work_s is compared with {self.seconds:.0f} s",
         )
 
 

@@ -26,7 +26,7 @@ if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot 
 // on a narrow screen a legend beside the panel would leave it half the width: it stands below, and the figure grows by its height
 if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
   const whole = plot._fullLayout || {}, legend = whole.legend || {}; // what a template says stands nowhere else
-  if (plot.closest(".panels") || !(legend.x > 1)) return;
+  if (!(legend.x > 1)) return;
   const below = {orientation: "h", x: 0, xref: "container", y: 0, yref: "container", yanchor: "bottom"};
   const change = Object.fromEntries(Object.entries(below).map(([name, value]) => ["legend." + name, value]));
   Plotly.relayout(plot, change).then(() => {

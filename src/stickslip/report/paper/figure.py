@@ -16,6 +16,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.errors import StickslipError, input_error, missing_package
+from stickslip.report.paper.labels import clear_labels
 from stickslip.report.paper.looks import worded
 from stickslip.report.paper.panels import Place, arranged, places, set_axes
 from stickslip.report.paper.traces import Panel, draw_trace, unknown_kinds
@@ -159,6 +160,8 @@ def _new(figure: go.Figure, found: Sequence[Place], width: float | None) -> Any:
             paper.colorbar(panel.mappable, ax=panel.axes, label=panel.bar_title)
     below = _legend_below(paper, *_legend(figure, panels))
     paper.set_size_inches(wide, sum(highs) + below)
+    for panel in panels:
+        clear_labels(paper, panel.axes, panel.labels)
     return paper
 
 

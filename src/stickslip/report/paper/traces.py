@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.report.paper.labels import Label, label_at
 from stickslip.report.paper.looks import (
     PLOTLY_MARKER,
     colour_map,
@@ -44,6 +45,8 @@ class Panel:
         Artist of the colour bar; None without a bar.
     bar_title
         Title of the colour bar.
+    labels
+        Texts beside points so far.
     """
 
     axes: Any
@@ -54,6 +57,7 @@ class Panel:
     stacked: dict[Any, float] = field(default_factory=dict)
     mappable: Any = None
     bar_title: str = ""
+    labels: list[Label] = field(default_factory=list)
 
 
 def unknown_kinds(traces: Any) -> list[str]:
@@ -142,7 +146,11 @@ def _dots(panel: Panel, trace: Any, x: Any, y: Any) -> Any:
     for name in dict.fromkeys(symbols):
         own = np.flatnonzero(symbols == name)
         shape, is_open = symbol(str(name))
-        look: dict[str, Any] = {"s": sizes[own] ** 2, "marker": shape, "linewidths": rims[own]}
+        look: dict[str, Any] = {
+            "s": sizes[own] ** 2,
+            "marker": shape,
+            "linewidths": np.maximum(rims[own], line_width(1.0) if is_open else 0.0),
+        }
         look |= _own_colours(colours, own, trace, is_open=is_open)
         points = panel.axes.scatter(x[own], y[own], **look, zorder=2.5)
         drawn = drawn or points
@@ -227,21 +235,23 @@ def _error_bars(panel: Panel, trace: Any, x: Any, y: Any) -> None:
 
 
 def _texts(panel: Panel, trace: Any, x: Any, y: Any) -> None:
-    texts = [trace.text] * len(x) if isinstance(trace.text, str) else trace.text
-    place = trace.textposition if isinstance(trace.textposition, str) else "middle center"
-    across = {"left": -1, "right": 1}.get(place.split()[-1], 0)
-    up = {"top": 1, "bottom": -1}.get(place.split()[0], 0)
-    for own_x, own_y, text in zip(x, y, texts if texts is not None else (), strict=False):
-        panel.axes.annotate(
-            worded(str(text)),
-            (own_x, own_y),
-            xytext=(4 * across, 4 * up),
-            textcoords="offset points",
-            ha={-1: "right", 0: "center", 1: "left"}[across],
-            va={-1: "top", 0: "center", 1: "bottom"}[up],
-            fontsize="small",
-            color=shade(trace.textfont.color if isinstance(trace.textfont.color, str) else None, None, "black"),
-        )
+    n = len(x)
+    texts = [trace.text] * n if isinstance(trace.text, str) else trace.text
+    if texts is None:
+        return
+    places = (
+        [trace.textposition or "middle center"] * n
+        if not isinstance(trace.textposition, list | tuple)
+        else trace.textposition
+    )
+    told = [one for one in zip(x, y, (worded(str(text)) for text in texts), places, strict=False) if one[2].strip()]
+    colour = shade(trace.textfont.color if isinstance(trace.textfont.color, str) else None, None, "black")
+    moves = len(told) == 1 and "markers" in str(trace.mode) and n > 1  # the label of a curve, not of a point
+    for own_x, own_y, text, place in told:
+        stand, align = place.split()
+        side = {"left": -1, "right": 1}.get(align, 0), {"top": 1, "bottom": -1}.get(stand, 0)
+        note = label_at(panel.axes, text.strip(), (own_x, own_y), side, colour)
+        panel.labels.append(Label(note, x if moves else x[:0], y if moves else y[:0]))
 
 
 def _bars(panel: Panel, trace: Any) -> Any:

@@ -73,7 +73,8 @@ def _answer(response: Response) -> Card:
     best = min(trusted, key=lambda c: peaks[c])
     ratio, told = (f"{amplitude(peaks[best], response.unit)}, " if response.per_force else ""), []
     if len(cases) == 1:
-        label = f"peak of {response.output_name}{best.where}"
+        output, comma, which = response.output_name.partition(", ")
+        label = f"peak of {output}{best.where}{comma}{which.removesuffix(' at the peak')}"
         told.append(f"{ratio}{response.peak_is(best)}")
     else:
         which = f"{len(trusted)} {LEVELS[least]} of " * (len(trusted) < len(counted_in))
@@ -96,7 +97,8 @@ def _answer(response: Response) -> Card:
     lower = min(counted_in, key=lambda c: peaks[c])
     if peaks[lower] < peaks[best]:
         told.append(f"{_size(response, lower)} is {response.level(lower)}{lower.where}")
-    value = f"{_size(response, best)} at {response.place(best)}{response.blade_at_peak(best)}"
+    blade = response.blade_at_peak(best) if len(cases) > 1 else ""  # the label of a single case names it
+    value = f"{_size(response, best)} at {response.place(best)}{blade}"
     return Card(value, label, ". ".join([*told, *_next(response, best, idle=idle)]) + ".")
 
 
@@ -129,8 +131,7 @@ def _size(response: Response, case: ShownCase) -> str:
     return amplitude(response.peak_response(case) * (case.excitation if response.per_force else 1.0), response.length)
 
 
-# a study has a key for variants; a Python model is solved once for each variant
-VARY = "[vary] of a study file, or in Python stickslip.compare of several models made by dataclasses.replace"
+VARY = "[vary] of a study file, stickslip.compare in Python"
 
 
 def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
@@ -143,7 +144,7 @@ def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
         return ["Next: press the contacts less or excite more, until they slip"]
     key = first_number(response.data)[0]
     if not key:
-        return [] if len(response.cases) > 1 else [f"Next: vary the load or the damper: {VARY}"]
+        return [] if len(response.cases) > 1 else [f"Next: vary the load or the damper ({VARY})"]
     family = next(own for own in families_of(response.data, key, response.peaked).values() if best in own)
     at = family.index(best)
     if at in (0, len(family) - 1):
@@ -259,8 +260,14 @@ def peaks(response: Response) -> Table:
             cases, forces, sizes, ratios, places, dampings, qualities, strict=True
         )
     ]
-    told = [*_damping_sentence(zeta), *_work_sentence(response)]
+    told = [*_force_sentence(response), *_damping_sentence(zeta), *_work_sentence(response)]
     return response.table("", told, head, rows)
+
+
+def _force_sentence(response: Response) -> list[str]:
+    if not response.per_force:
+        return []
+    return ["The excitation is the amplitude of the largest harmonic force of a case; responses are divided by it."]
 
 
 def _damping_sentence(zeta: FloatArray) -> list[str]:

@@ -68,6 +68,7 @@ def _curve(response: Response, case: ShownCase, name: str) -> go.Scatter:
         name=name if len(response.cases) > 1 else "response",
         legendgroup="cases",
         legendgrouptitle={"text": CASE} if len(response.cases) > 1 else None,
+        showlegend=len(response.cases) > 1,
         line={"color": case.colour, "width": 1.6},
         marker={
             "symbol": _symbols(response)[at].tolist(),
@@ -126,11 +127,10 @@ def _stability_keys(response: Response) -> list[go.Scatter]:
     if not _marked(response):
         return []
     known = ~(response.unstable | response.unknown_stability)
+    group = "motion" if len(response.cases) > 1 else ""
     there = {STABLE: known.any(), UNSTABLE: response.unstable.any(), UNKNOWN: response.unknown_stability.any()}
     return [
-        go.Scatter(
-            x=[None], y=[None], mode="lines", name=kind, legendgroup="motion", line={"color": MUTED, **MARKS[kind]}
-        )
+        go.Scatter(x=[None], y=[None], mode="lines", name=kind, legendgroup=group, line={"color": MUTED, **MARKS[kind]})
         for kind, some in there.items()
         if some
     ]
@@ -198,7 +198,7 @@ def _peaks(response: Response) -> str:
 def _caption(response: Response) -> str:
     converged, (x, _, unit) = response.converged, abscissa(response)
     high = converged & response.more
-    over = " divided by the amplitude of the excitation" if response.per_force else ""
+    over = " divided by the amplitude of the largest harmonic force" if response.per_force else ""
     name = amplitude_name(response.data)
     text = f"{name[0].upper()}{name[1:]} of {response.output_name}{over}. {_peaks(response)}"
     if response.steps:
@@ -306,13 +306,15 @@ def frequency_response(response: Response) -> Plot | None:
     scale, shown = response.scale, panels(response)
     figure, told = _in_panels(response, shown) if shown else _many(response)
     figure.add_traces(_stability_keys(response))
+    # a single curve needs no groups: its keys stand in one row below a narrow panel
+    group, title = ("key", "points") if len(response.cases) > 1 else ("", "")
     if response.decides:
         low, more = response.low_name, response.more_name
-        figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))
-        figure.add_trace(key_marker(more, "diamond", "key"))
+        figure.add_trace(key_marker(f"H = {low}", "circle", group, title))
+        figure.add_trace(key_marker(more, "diamond", group))
     for level, word, symbol in ((1, "doubtful", "circle-open"), (2, "wrong", "x")):
         if np.any(response.converged & (response.levels == level)):
-            figure.add_trace(key_marker(word, symbol, "key"))
+            figure.add_trace(key_marker(word, symbol, group))
     _, name, unit = abscissa(response)
     rows = -(-len(shown) // (2 if len(shown) <= 4 else 3)) if len(shown) > 1 else 1
     height = max(480, 150 + 210 * rows)

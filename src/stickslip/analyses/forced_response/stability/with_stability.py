@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from stickslip.analyses.forced_response.estimate import SECONDS_OF_DOUBTS
 from stickslip.analyses.forced_response.problem import IN_TIME, STABLE, Question
 from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
 from stickslip.analyses.forced_response.stability.examining import (
@@ -33,9 +34,6 @@ from stickslip.study.store.progress import LOG, stage
 from stickslip.units import HZ
 
 MOST_PEAKS = 3  # largest motions integrated in time, each after the larger one proved unstable
-SECONDS_OF_DOUBTS = (
-    120.0  # estimated seconds of time integration, from its counted steps, for the other motions of a case
-)
 
 
 @dataclass(eq=False)

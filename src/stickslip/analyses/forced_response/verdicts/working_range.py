@@ -13,7 +13,7 @@ from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
 from stickslip.study.varied import families, first_varied_number, key_name
-from stickslip.study.verdict import LEVELS, said
+from stickslip.study.verdict import LEVELS, said, together
 
 Regime = Literal["stuck", "stiffens", "works", "lets go"]
 REGIMES: tuple[Regime, ...] = get_args(Regime)  # datasets store the index of a regime
@@ -310,10 +310,13 @@ MOST_TOLD = 3  # curves described in sentences; with more curves, each gets one 
 
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:
-    """State the working range of each curve of a forced response; empty if none can be judged."""
+    """State the working range of each curve of a forced response, curves that do the same in one line; empty if none can be judged."""
     found = working_ranges(data)
     if len(found) > MOST_TOLD:
-        return tuple(said(own.others, range_line(own)) for own in found)
+        alike: dict[str, list[str]] = {}
+        for own in found:
+            alike.setdefault(range_line(own), []).append(own.others)
+        return tuple(said(together(curves), line) for line, curves in alike.items())
     return tuple(said(own.others, text) for own in found for text in range_sentences(own))
 
 
