@@ -119,3 +119,22 @@ def test_vary_and_python_name_the_key_in_its_unit(tmp_path):
     model = read_study(write_four_masses(tmp_path / "right")).model()
     with pytest.raises(InputError, match=r"frequency_rpm.*Did you mean 'frequency_hz'\? 600 rpm are 10 Hz"):
         ss.Model(parts=model.parts, loads=model.loads).forced_response(frequency_rpm=600.0)
+
+
+def test_what_elastic_coulomb_needs_between_single_dofs_is_said(tmp_path):
+    """Both stiffnesses have no effect there: 0 is enough, as the message and `stickslip keys` say."""
+    path = write_four_masses(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    old = 'law = "jenkins", tangential_stiffness_n_per_m = 2e4, slip_limit_n = 2.0'
+    new = 'law = "elastic_coulomb", tangential_stiffness_n_per_m = 2e4, friction_coefficient = 0.5, preload_n = 4.0'
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        read_study(path)
+    axial, normal = str(error.value).splitlines()
+    assert "axial_stiffness_n_per_m: is missing, the law elastic_coulomb needs it" in axial
+    assert "(0 between single dofs, which move along one line) in N/m" in axial
+    assert "(0 where the normal force stays the preload, as between single dofs) in N/m" in normal
+    more = f"{new}, axial_stiffness_n_per_m = 0.0, normal_stiffness_n_per_m = 0.0"
+    path.write_text(text.replace(old, more), encoding="utf-8")
+    assert read_study(path).model().contacts["brake"].law.k_n == 0.0

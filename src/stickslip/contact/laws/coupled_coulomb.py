@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import COUPLED_TANGENTS, kernel_in
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.laws.quantities import check_any_stiffness, friction_coefficient, normal_stiffness
+from stickslip.contact.laws.quantities import KEEPS_PRELOAD, check_any_stiffness, friction_coefficient, normal_stiffness
 from stickslip.units import check_quantities, quantity
 
 
@@ -53,7 +53,7 @@ class CoupledCoulomb:
         least=0,
         shared=True,
     )
-    k_n: float = normal_stiffness()
+    k_n: float = normal_stiffness(KEEPS_PRELOAD)
     mu: float = friction_coefficient()
     preload: float = 0.0
     k_w: float | None = quantity(

@@ -9,6 +9,8 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.quantities import (
+    KEEPS_PRELOAD,
+    NO_SECOND_TANGENT,
     axial_stiffness,
     check_any_stiffness,
     friction_coefficient,
@@ -51,8 +53,8 @@ class ElasticCoulomb:
     """
 
     k_t: float = tangential_stiffness()
-    k_w: float = axial_stiffness()
-    k_n: float = normal_stiffness()
+    k_w: float = axial_stiffness(NO_SECOND_TANGENT)
+    k_n: float = normal_stiffness(KEEPS_PRELOAD)
     mu: float = friction_coefficient()
     preload: float = 0.0
     residual_traction: float | None = quantity(

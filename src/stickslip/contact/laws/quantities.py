@@ -11,14 +11,18 @@ def tangential_stiffness(**given: Any) -> Any:
     return _stiffness("tangent t", "tangential_stiffness", given)
 
 
-def axial_stiffness(**given: Any) -> Any:
-    """Return the field of the stiffness along w."""
-    return _stiffness("tangent w", "axial_stiffness", given)
+def axial_stiffness(note: str = "", **given: Any) -> Any:
+    """Return the field of the stiffness along w; `note` goes on with its meaning."""
+    return _stiffness(f"tangent w{note}", "axial_stiffness", given)
 
 
-def normal_stiffness(**given: Any) -> Any:
-    """Return the field of the stiffness along the normal."""
-    return _stiffness("normal", "normal_stiffness", given)
+def normal_stiffness(note: str = "", **given: Any) -> Any:
+    """Return the field of the stiffness along the normal; `note` goes on with its meaning."""
+    return _stiffness(f"normal{note}", "normal_stiffness", given)
+
+
+NO_SECOND_TANGENT = " (0 between single dofs, which move along one line)"
+KEEPS_PRELOAD = " (0 where the normal force stays the preload, as between single dofs)"
 
 
 def friction_coefficient() -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.errors import did_you_mean, input_error
-from stickslip.study.file.model.contacts import keys_of
+from stickslip.study.file.model.contacts import keys_of, meaning_of
 from stickslip.study.file.tables import study_tables
 
 REQUIRED = "required"
@@ -91,7 +91,8 @@ def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
     for key, default, meaning in _rows(node):
         if key in every[law]:
             needed = REQUIRED if every[law][key] else default
-            rows.append((key, 'with per = "area"' if key in per_area else needed, meaning))
+            own = meaning_of(law, key) or meaning
+            rows.append((key, 'with per = "area"' if key in per_area else needed, own))
     return Keys(f'[{title}] with law = "{law}"', tuple(rows))
 
 

@@ -231,6 +231,14 @@ def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
     return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(others, False)
 
 
+def meaning_of(law: str, key: str) -> str:
+    """Return the meaning of a key in a law; empty if it is no key of the law's own class."""
+    found = (
+        {} if is_address(law) else columns_of(ALL_LAWS[law], per_area=False) | columns_of(ALL_LAWS[law], per_area=True)
+    )
+    return str(found[key][1].description) if key in found else ""
+
+
 def _owners(key: str, *, per_area: bool) -> list[str]:
     return [law for law in ALL_LAWS if key in keys_of(law, per_area=per_area)]
 
@@ -243,7 +251,7 @@ def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
     known = keys_of(law, per_area=area)
     if value is None:
         if known.get(key):
-            about = cls.model_fields[key].description
+            about = meaning_of(law, key) or cls.model_fields[key].description
             raise custom_error(f"is missing, the law {law} needs it", f"Add it: {about}.")
     elif key not in known:
         raise _foreign(law, key, area, value)
@@ -295,4 +303,4 @@ def _made() -> type[ContactBase]:
 
 
 ContactTable = _made()
-__all__ = ["ContactTable", "JoinTable", "Pair", "keys_of", "law_class"]
+__all__ = ["ContactTable", "JoinTable", "Pair", "keys_of", "law_class", "meaning_of"]
