@@ -6,6 +6,7 @@ Property tests are repeatable and have no time limit per example.
 import gc
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from browser import Browser
@@ -39,6 +40,25 @@ def peak_alone() -> Iterator[None]:
         for name in ("model_changes", "stiffness_changes", "motions_elsewhere"):
             here.setattr(analysis, name, lambda *_: {})
         here.setattr(problem, "more_modes", lambda *_: None)
+        yield
+
+
+@pytest.fixture(scope="module")
+def parts_once() -> Iterator[None]:
+    """Make each part of the studies of a module once, as the cases of one study do: by the digest of all that it depends on."""
+    from stickslip.study.models.parts import Workshop, digest
+
+    part, made = Workshop.part, dict[str, Any]()
+
+    def found(self: Workshop, name: str) -> Any:
+        key = digest(self.tables, name, self.home)
+        if key in made:
+            self.memo.setdefault(key, made[key])
+        made[key] = part(self, name)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as here:
+        here.setattr(Workshop, "part", found)
         yield
 
 

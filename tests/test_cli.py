@@ -37,7 +37,7 @@ from stickslip.study.store import threads
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import Interrupted
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 DOCS = Path(__file__).parents[1] / "docs"
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")

@@ -20,7 +20,7 @@ from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 from stickslip.study.store.netcdf import read_tree
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 CHAIN = """
 schema_version = 2

@@ -12,7 +12,7 @@ from stickslip.api.study import Study
 from stickslip.assembly.forces import engine_order
 from stickslip.errors import InputError
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 SECTORS = 6
 # disk, blade and tip of a sector; shrouds rub and hit their neighbours, the root rubs in its slot

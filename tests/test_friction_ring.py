@@ -11,7 +11,7 @@ from test_cli import done
 from evidence.validation.case_b9_friction_ring import FREQUENCIES, HARMONICS
 from stickslip.api.result import Result
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 EXAMPLE = (EXAMPLES / "friction_ring" / "study.toml").read_text()
 SECTORS = 24

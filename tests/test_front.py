@@ -27,7 +27,7 @@ from stickslip.study.coordinates import with_coordinates
 from stickslip.study.file.keys import REQUIRED, table_keys
 from stickslip.study.store.progress import advance, at_work, stage, sum_up
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 ROOT = Path(__file__).parents[1]
 

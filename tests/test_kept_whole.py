@@ -11,7 +11,7 @@ from stickslip.response.forced.sweep import Sweep
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 MODEL = (
     CONTACT.format("node_to_segment").replace("interference_m = 1e-6\n", "")

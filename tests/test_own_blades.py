@@ -32,7 +32,7 @@ from stickslip.response.system import System
 from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 EXAMPLE = EXAMPLES / "own_blades"
 PULL, RATIO, APEX, DEG = 2000.0, 200.0, 0.3186346, math.pi / 180

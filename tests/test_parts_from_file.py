@@ -19,7 +19,7 @@ from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 from stickslip.study.models.study import read_study
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 BEAM = """
 schema_version = 2

@@ -27,7 +27,7 @@ from stickslip.model.rigid.body import body_of_tensor
 from stickslip.study.models.study import read_study
 from stickslip.units import RPM
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 ORDER, H, PITCH = 2, 3, 2 * math.pi / SECTORS
 AXIS = Axis()

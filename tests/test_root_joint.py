@@ -22,7 +22,7 @@ from stickslip.model.fe.solid import Material
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "root_joint"
 _spec = importlib.util.spec_from_file_location("make_decks", EXAMPLE / "make_decks.py")

@@ -58,7 +58,7 @@ from stickslip.study.analysis import Solved
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 
 def response_of(asked: Question) -> Response:

@@ -20,7 +20,7 @@ from stickslip.response.time.transient import TransientResult
 from stickslip.study.models.study import read_study
 from stickslip.study.store.journal import JobJournal
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 CHECK = Check(frequency_hz=180.0, balance=1.02e-3, transient=1.0e-3, settled=True, periods=90, order=5)
 

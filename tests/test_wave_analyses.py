@@ -36,6 +36,7 @@ from stickslip.study.store.netcdf import one_case
 from stickslip.study.verdict import conclusion, of_tree, stored
 from stickslip.units import RPM
 
+pytestmark = pytest.mark.usefixtures("parts_once")
 STEEL = """
 schema_version = 2
 [material]

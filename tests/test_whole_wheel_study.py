@@ -27,7 +27,7 @@ from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 Vector = Sequence[float]
 AXIS, PITCH = Axis(), 2 * math.pi / SECTORS
