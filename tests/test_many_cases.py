@@ -15,6 +15,8 @@ from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.many_cases import FEW, MOST_IN_PANELS, extremes, panels
 from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.verdicts import working_range
+from stickslip.analyses.forced_response.verdicts.working_range import WorkingRange
 from stickslip.report.cases import cases_of, families_of
 from stickslip.report.content import Words
 from stickslip.report.paper.figure import draw
@@ -190,3 +192,28 @@ def test_the_answer_says_where_friction_does_nothing_and_where_no_case_differs()
     assert "Friction dissipates nothing at any peak" in told.note
     assert "Next: press the contacts less" in told.note
     assert isinstance(energy(Response(still)), Words)  # no empty axes
+
+
+def test_the_keys_of_a_single_curve_stand_in_one_row_and_name_no_curve() -> None:
+    """Groups of keys stand one below the other, so that the figure ended below the first 900 px of a narrow screen."""
+    alone = frequency_response(Response(synthetic_result(ratios=(5,), n=12, verify=False)))
+    assert alone is not None
+    keys = [trace for trace in alone.figure.data if trace.showlegend is not False]
+    assert "response" not in [trace.name for trace in keys]
+    assert "H = 1" in [trace.name for trace in keys]
+    assert not any(trace.legendgroup or trace.legendgrouptitle.text for trace in keys)
+    assert alone.figure.layout.legend.traceorder == "normal"
+    several = frequency_response(Response(synthetic_result(ratios=(20, 5), n=12, verify=False)))
+    assert several is not None
+    assert {trace.legendgroup for trace in several.figure.data} >= {"cases", "key"}
+
+
+def test_curves_of_which_the_same_is_told_share_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"limit {limit} N, gap {gap} mm" for limit in (1, 2) for gap in (3, 4)]
+    curves = tuple(WorkingRange((), (), "force" if "limit 1" in name else "mass", others=name) for name in names)
+    monkeypatch.setattr(working_range, "working_ranges", lambda _: curves)
+    lines = working_range.range_lines(xr.Dataset())
+    assert lines == (
+        "gap 3 mm, 4 mm, each with limit 1 N: cannot be told from these values of force",
+        "gap 3 mm, 4 mm, each with limit 2 N: cannot be told from these values of mass",
+    )

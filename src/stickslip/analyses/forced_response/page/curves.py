@@ -324,6 +324,8 @@ def frequency_response(response: Response) -> Plot | None:
         buttons[0]["y"] = 1 + 30 / height
         figure.update_layout(margin_t=80)
     figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
+    if len(response.cases) == 1:
+        figure.update_layout(legend_traceorder="normal")  # in one row below a narrow panel
     figure.update_xaxes(title_text=f"{name} ({unit})", row=rows if rows > 1 else None)
     ticks = log_ticks(response.accepted * scale.factor)
     figure.update_yaxes(type="log", **ticks)
