@@ -223,6 +223,26 @@ def opened(browser: Browser, page: Path, tmp_path_factory: pytest.TempPathFactor
 
 
 @needs_browser
+@pytest.mark.parametrize("verdicts", [8, 9])
+def test_paper_has_the_answer_before_a_long_list_of_verdicts(browser: Browser, light_page: Path, verdicts: int) -> None:
+    browser.width(760)
+    browser.open(light_page)
+    items = "<li>a verdict</li>" * verdicts
+    box = f"<details class='box good'><summary>All trusted.</summary><ul>{items}</ul></details>"
+    browser.run(f'document.querySelector(".box").outerHTML = "{box}"')
+    where = "['details.box', 'p.box', '.answer', '.cards'].map(s => [...document.querySelector('main').children].indexOf(document.querySelector(s)))"
+    before = browser.run(where)
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    box, line, answer, numbers = browser.run(where)
+    assert box == numbers + 1 if verdicts > 8 else box < answer
+    assert (line >= 0) == (verdicts > 8)
+    assert line < answer
+    assert browser.run("document.querySelector('details.box').open")
+    browser.run("dispatchEvent(new Event('afterprint'))")
+    assert browser.run(where) == before
+
+
+@needs_browser
 @pytest.mark.parametrize("ratios", [(50, 20, 5), (5,)])
 def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
     browser: Browser, tmp_path: Path, ratios: tuple[float, ...]

@@ -60,6 +60,17 @@ addEventListener("beforeprint", () => document.querySelectorAll("details:not([op
   folded.open = true;
   addEventListener("afterprint", () => { folded.open = false; }, {once: true});
 }));
+// many verdicts, all open, would stand before the answer on paper: the first line stays, the list follows the numbers
+addEventListener("beforeprint", () => {
+  const box = document.querySelector("main > details.box"), numbers = document.querySelector("main > .cards") || document.querySelector("main > section");
+  if (!box || !numbers || box.querySelectorAll("li").length <= 8) return;
+  const line = document.createElement("p");
+  line.className = box.className;
+  line.append(Object.assign(document.createElement("b"), {textContent: box.querySelector("summary").textContent}));
+  box.replaceWith(line);
+  numbers[numbers.matches("section") ? "before" : "after"](box);
+  addEventListener("afterprint", () => line.replaceWith(box), {once: true});
+});
 // lines of sentences do not break between a number and its unit, or before the value of a key
 document.querySelectorAll(".card, figcaption, main p, main li").forEach(told => {
   const texts = document.createTreeWalker(told, NodeFilter.SHOW_TEXT);
