@@ -190,7 +190,7 @@ class FileModel(PartTable):
         None,
         ge=1,
         le=1000,
-        description="number of equal sectors of the wheel; left out: as in the deck's cyclic symmetry, or 1 for the whole structure",
+        description="number of equal sectors of the wheel; left out: as in the deck's cyclic symmetry, or 1 for the whole structure. A given 1 says that faces which look like those of a sector are free",
     )
     low_face: Name | None = Field(
         None,
