@@ -92,6 +92,15 @@ def test_faces_in_contact_are_no_doubt_and_a_wheel_names_what_is_missing() -> No
     assert doubts(mesh, sectors=30, faces=("low", "high")) == []  # of another wheel: they do not touch
 
 
+def test_a_whole_wheel_is_no_sector() -> None:
+    """Blades of a whole wheel have faces that meet after a turn, too: twelve of 24 sectors, each by itself."""
+    one = wedge(8)
+    turned = [Axis().turned(one.points, 2 * np.pi * k / 12) for k in range(12)]
+    cells = [one.cells + k * len(one.points) for k in range(12)]
+    assert doubts(SolidMesh(np.vstack(turned), np.vstack(cells), {})) == []
+    assert len(doubts(SolidMesh(np.vstack(turned[:3]), np.vstack(cells[:3]), {}))) == 1
+
+
 def test_copies_are_no_doubt() -> None:
     part = solid_part(wedge(8), STEEL, clamped=())
     assert untied_faces({"one": part, "other": replace(part, template=part)}, ()) == []

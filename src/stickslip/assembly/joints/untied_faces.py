@@ -139,7 +139,7 @@ def meeting_faces(mesh: SolidMesh, axis: Axis, free: BoolArray | None = None) ->
     place, along, angle = _cylindrical(axis, centre, normal / area[:, None])
     counts = np.ones(len(skin), dtype=bool) if free is None else free
     low, high = (np.flatnonzero(counts & (side * along[:, 1] > FACING)) for side in (-1.0, 1.0))
-    if not (low.size and high.size):
+    if not (low.size and high.size) or _extent(angle) > math.pi:
         return []
     from scipy.spatial import cKDTree
 
@@ -157,6 +157,12 @@ def meeting_faces(mesh: SolidMesh, axis: Axis, free: BoolArray | None = None) ->
         share = float(area[np.unique(i[here])].sum() / area.sum())
         found.append(MeetingFaces(int(count), axis, sides[0][sides[0] >= 0], sides[1][sides[1] >= 0], share))
     return found
+
+
+def _extent(angle: FloatArray) -> float:
+    """Return the angle (rad) that holds all `angle`, the circle without the largest gap; whole wheels have 2π."""
+    ordered = np.sort(angle)
+    return 2 * math.pi - float(np.diff(ordered, append=ordered[0] + 2 * math.pi).max())
 
 
 def _facets(points: FloatArray, skin: IntArray) -> tuple[FloatArray, FloatArray]:
