@@ -152,7 +152,7 @@ def without_tie(path: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("low", "high", "sectors", "said"),
-    [("CYCLIC_LOW", "CYCLIC_HIGH", 23, "15.6522°"), ("CYCLIC_LOW", "CYCLIC_HIHG", 24, "Did you mean 'CYCLIC_HIGH'?")],
+    [("CYCLIC_LOW", "CYCLIC_HIGH", 23, "15.652°"), ("CYCLIC_LOW", "CYCLIC_HIHG", 24, "Did you mean 'CYCLIC_HIGH'?")],
 )
 def test_faces_that_do_not_match_are_told_by_the_keys_of_the_study(
     tmp_path: Path, low: str, high: str, sectors: int, said: str
