@@ -29,7 +29,7 @@ from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.0, 1.0])})
 LAW = ss.Jenkins(k_t=1e3, limit=1.0)

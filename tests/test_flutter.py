@@ -28,6 +28,8 @@ from stickslip.response.rotating.flutter import flutter_of_wave
 from stickslip.study.analysis import named
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("parts_once")
+
 N = fluid.BLADES
 HERTZ = np.linspace(0.05, 0.45, 33)
 

@@ -26,6 +26,8 @@ from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
+pytestmark = pytest.mark.usefixtures("parts_once")
+
 STICKY = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=5e6, mu=0.3)
 
 

@@ -16,7 +16,7 @@ from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.mistuned import mistuned_wheel
 from stickslip.study.analysis import named
 
-pytestmark = pytest.mark.usefixtures("peak_alone")
+pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
 
 ROOT = Path(__file__).parents[1]
 TURN = 2 * np.pi

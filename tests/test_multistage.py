@@ -24,6 +24,8 @@ from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
 from stickslip.study.store.netcdf import one_case
 
+pytestmark = pytest.mark.usefixtures("parts_once")
+
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_stages"
 PLANE = 0.1  # m, of the flange
 AROUND = 24  # nodes on a circle

@@ -30,6 +30,8 @@ from stickslip.response.forced.response import Sweep, accepted_points, forced_pr
 from stickslip.response.recovery import signals
 from stickslip.study.models.study import read_study
 
+pytestmark = pytest.mark.usefixtures("parts_once")
+
 PITCH, AXIS = 2 * math.pi / SECTORS, Axis()
 HALF = PITCH / 2
 ORDERS = {2: 3000.0, 3: 1500.0}  # engine order -> N

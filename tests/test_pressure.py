@@ -21,6 +21,8 @@ from stickslip.model.fe.solid import Material
 from stickslip.reduction.waves import wave
 from stickslip.study.models.pressure import read_pressure
 
+pytestmark = pytest.mark.usefixtures("parts_once")
+
 WIDE, HIGH = 0.05, 0.03
 
 
