@@ -1,6 +1,7 @@
 """Designs held against each other, in Python, by the command line, and against a CSV file."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -191,6 +192,19 @@ def test_the_head_has_the_cost_where_harmonics_are_chosen_differently() -> None:
     assert [note.rpartition("; ")[2] for note in told] == ["900 unknowns solved", "450 unknowns solved"]
     same = [card.note for card in cards(ss.compare(designs[0], designs[0], names=("a", "b")).designs, divided=True)]
     assert not any("unknowns" in note for note in same)
+    assert not any("along the curve" in note for note in same)
+
+
+def test_the_head_has_the_largest_difference_beside_the_cost() -> None:
+    """A strategy that is right at the peak may be wrong elsewhere: the first design is what the others are held against."""
+    designs = [design((50,), 1.0, 0.6), design((50,), 1.1, 0.6)]
+    for own, selection in zip(designs, ("always_high", "guarded_alert"), strict=True):
+        own.data["forced_response"] = own.data["forced_response"].to_dataset().assign_attrs(selection=selection)
+    first, second = (card.note for card in cards(ss.compare(*designs, names=("a", "b")).designs, divided=True))
+    assert "along the curve" not in first
+    found = re.search(r"; along the curve up to ([\d.]+) % at ([\d.]+) Hz of its peak", second)
+    assert found
+    assert float(found[1]) == pytest.approx(10.0, abs=0.5)
 
 
 def test_cases_are_paired_by_what_is_varied_whatever_their_names_are() -> None:

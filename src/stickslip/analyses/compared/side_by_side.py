@@ -413,6 +413,7 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
     """Return a card for each design at a case, compared with the first design, with its cost where harmonics are chosen differently."""
     found: list[Card] = []
     first, against, loaded = float("nan"), "", float("nan")
+    reference: MeasuredCurve | None = None
     costed = len({tuple(str(d.response.data.attrs.get(k)) for k in _CHOICE) for d, _ in pairs if d.response}) > 1
     for design, case in pairs:
         response = design.response
@@ -422,17 +423,36 @@ def _held(pairs: Sequence[tuple[Design, ShownCase | None]], label: str, unit: st
         note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
         if not found:
             first, against, loaded = height, label.format(design.name), case.excitation
+            reference = _as_curve(response, case, divided=divided)
         elif not _same_load(case.excitation, loaded):
             note += f"; loaded by {quantity(case.excitation, 'N')}, {against} by {quantity(loaded, 'N')}: not compared"
         else:
             off = over_first(height, first)
             how = f"{percent(abs(off), 3)} {'more' if off > 0 else 'less'} than" if off else "equal to the"
             note += f"; {how} {against}"
+            if costed and reference is not None:
+                note += _farthest(response, case, reference, divided=divided)
         unknowns = dict(zip(response.cases, response.numbers_of, strict=True))[case].unknowns_solved
         if costed and unknowns >= 0:
             note += f"; {counted(unknowns, 'unknown')} solved"
         found.append(Card(quantity(height, unit), label.format(design.name), note))
     return found
+
+
+def _as_curve(response: Response, case: ShownCase, *, divided: bool) -> MeasuredCurve | None:
+    """Return the response of a case as a reference for others; None where it folds or hardly has a point."""
+    at = response.points(case)
+    own, hz = amplitudes(response, divided=divided)[at], response.hz[at]
+    known = np.isfinite(own)
+    if np.count_nonzero(known) < 2 or np.any(np.diff(hz) < 0):
+        return None
+    return MeasuredCurve("", hz[known], own[known], divided)
+
+
+def _farthest(response: Response, case: ShownCase, reference: MeasuredCurve, *, divided: bool) -> str:
+    """Return the clause on the largest difference along the curve, beside the cost; empty where curves cannot be compared."""
+    told = _along(response, case, reference, divided=divided)
+    return f"; along the curve up to {told} of its peak" if "%" in told else ""
 
 
 def _same_load(one: float, other: float) -> bool:
