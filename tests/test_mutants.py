@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from evidence.mutants.__main__ import judged, key, told
-from evidence.mutants.judge import Copy
+from evidence.mutants.judge import Copy, Judged
 from evidence.mutants.points import Mutant, drawn, is_another, mutants_of
 from evidence.mutants.probes import MARKS, probe
 from evidence.mutants.reach import Reach, names_of, record
@@ -201,10 +201,9 @@ def test_what_a_test_sees_is_noticed_and_what_nothing_can_see_survives(
             mutant = mutant_of(source, before, after)
             # what a cached function, a fixture of several tests or a process has run counts for each test that uses it
             assert reach.tests(mutant) == ({one, cached} if reached == one else {other, shared, started}), before
-            found = copy.judge(mutant, [reached], 1.0, 1)
-            assert found.by == by, before
+            assert copy.judge(mutant, [reached], 1.0) == by, before
             assert (copy.package / "small.py").read_text() == source
-            text = told(found, source)
+            text = told(Judged(mutant, by, 1, 1), source)
             assert ("SURVIVED" in text) == (not by)
             assert by or (f"+        {after}" in text.replace("return ", "") or key(mutant) in text)
         assert copy.passes(one, 1.0)

@@ -79,8 +79,8 @@ class Copy:
         )
         self.compiled = {file: (file.read_bytes(), file.stat()) for file in self.package.rglob("*.nb[ic]")}
 
-    def judge(self, mutant: Mutant, tests: Sequence[str], cpu_s: float, reach: int) -> Judged:
-        """Run tests with a mutant in place.
+    def judge(self, mutant: Mutant, tests: Sequence[str], cpu_s: float) -> str:
+        """Run tests with a mutant in place, and return what `failing` does.
 
         Parameters
         ----------
@@ -90,19 +90,16 @@ class Copy:
             Their names, in the order in which they run.
         cpu_s
             What they took without it, s.
-        reach
-            How many tests reach it.
         """
         file = self.package / mutant.path
         source, stat = file.read_bytes(), file.stat()
         file.write_text(mutant.applied(source.decode()), encoding="utf-8")
         try:
-            by = self.failing(tests, cpu_s)
+            return self.failing(tests, cpu_s)
         finally:
             file.write_bytes(source)
             os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
             self._restore_compiled()
-        return Judged(mutant, by, len(tests), reach)
 
     def failing(self, tests: Sequence[str], cpu_s: float) -> str:
         """Return the first test that fails, or what ended all of them; empty if none does."""

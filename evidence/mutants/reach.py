@@ -17,7 +17,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +58,11 @@ def record(root: Path, cache: Path, workers: int = 1) -> None:
     pieces = [to_do[start : start + PIECE] for start in range(0, len(to_do), PIECE)]
     with ThreadPoolExecutor(workers) as pool:
         for done in pool.map(lambda files: _record(root, cache, files), pieces):
-            print(f"recorded {', '.join(done)}", flush=True)
+            print(f"recorded {done}", flush=True)
 
 
-def _record(root: Path, cache: Path, files: Sequence[Path]) -> list[str]:
-    """Record some test files, with the sources as they are, and return their names."""
+def _record(root: Path, cache: Path, files: Sequence[Path]) -> str:
+    """Record some test files, with the sources as they are, and return their names and how their tests ended."""
     sums = {f"tests/{file.name}": _digest(file) for file in files}
     where = cache / f"piece_{sum_of(repr(sums).encode())[:12]}"
     package = root / "src" / "stickslip"
@@ -78,27 +78,16 @@ def _record(root: Path, cache: Path, files: Sequence[Path]) -> list[str]:
     said = _run(root, where.with_suffix(".marks"), list(sums))
     own = {path: {"first": first[path], "sum": sum_of(text.encode())} for path, text in sources.items()}
     where.with_suffix(".json").write_text(json.dumps(said | {"files": sums, "sources": own}), encoding="utf-8")
-    return list(sums)
+    return f"{', '.join(sums)}: {said['ended']}"
 
 
 def _run(root: Path, marks: Path, files: Sequence[str]) -> dict[str, Any]:
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:cov",
-        "-p",
-        "evidence.mutants.recorder",
-    ]
+    plugins = ["-p", "no:cacheprovider", "-p", "no:cov", "-p", "evidence.mutants.recorder"]
     said = Path(f"{marks}.said")
     said.unlink(missing_ok=True)
     paths = os.pathsep.join([str(Path(__file__).with_name("start")), str(root / "src"), str(root)])
     done = subprocess.run(
-        [*command, *files],
+        [sys.executable, "-m", "pytest", "-q", *plugins, *files],
         cwd=root,
         check=False,
         capture_output=True,
@@ -111,7 +100,7 @@ def _run(root: Path, marks: Path, files: Sequence[str]) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(said.read_text(encoding="utf-8"))
     for left in (marks, marks.with_suffix(".first"), said):
         left.unlink()
-    return found
+    return found | {"ended": done.stdout.splitlines()[-1]}
 
 
 def _digest(file: Path) -> str:
@@ -274,7 +263,7 @@ class Reach:
             before = (self.cache / "sources" / own["sum"]).read_text(encoding="utf-8")
         valid = {k: t for k, t in enumerate(piece["tests"]) if self._valid.get(t.partition("::")[0]) == piece["data"]}
         found = {}
-        for line, head in probe(ast.parse(before)).items():
+        for line, head in _heads(before).items():
             bits = int(piece["places"].get(str(own["first"] + head), "0"), 16)
             found[line] = {t for k, t in valid.items() if bits >> k & 1}
         return found if before == now else _moved(found, before, now)
@@ -333,6 +322,11 @@ class Reach:
     def in_order(self, tests: Iterable[str]) -> list[str]:
         """Return tests: those that read every table, then the cheapest first."""
         return sorted(tests, key=lambda t: (not t.startswith(WHOLE), self.cost_s(t), t))
+
+
+@cache
+def _heads(source: str) -> dict[int, int]:
+    return probe(ast.parse(source))
 
 
 def _moved(found: Mapping[int, set[str]], old: str, new: str) -> dict[int, set[str]]:
