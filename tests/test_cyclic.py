@@ -17,7 +17,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.structure import Dofs, Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel, wheel_shape
-from stickslip.reduction.turning import dof_rotation
+from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
 
 TILTED = Axis((0.3, -0.4, 0.8), (0.1, 0.2, -0.3))
@@ -382,6 +382,12 @@ def test_vectors_of_all_kinds_are_turned():
     assert turned[6, 6] == 1.0
     assert np.count_nonzero(turned) == 4 * 9 + 1
     np.testing.assert_allclose(turned @ turned.T, np.eye(13), atol=1e-15)
+
+
+def test_bodies_beside_nodes_are_told_apart_by_their_places():
+    position = np.array([[0.0, 0.0, 0.0]] * 2 + [[1.0, 0.0, 0.0]] * 2 + [[2.0, 0.0, 0.0]])
+    dofs = Dofs(np.array([3, 3, -1, -1, -1]), ("x", "y", "x", "y", "x"), position)
+    np.testing.assert_array_equal(node_table(dofs)[:, :2], [[0, 1], [2, 3], [4, -1]])
 
 
 def test_a_component_that_appears_twice_is_named():

@@ -83,12 +83,15 @@ def test_curves_are_solid_dashed_or_thin_by_stability(words: list[str], kinds: l
     numbers = [MOTION[words[k * len(words) // count]] for k in range(count)]
     plot = frequency_response(Response(data.assign(motion_stability=("point", numbers))))
     assert plot is not None
-    keys = [t for t in plot.figure.data if t.legendgroup == "motion"]
-    assert [t.name for t in keys] == kinds
     looks = {"stable": (1.8, "solid"), "unstable": (1.8, "dash"), "stability not known": (0.7, "solid")}
+    keys = [t for t in plot.figure.data if t.name in looks]
+    assert [t.name for t in keys] == kinds
     assert [(t.line.width, t.line.dash) for t in keys] == [looks[kind] for kind in kinds]
     drawn = [t for t in plot.figure.data if t.mode == "lines" and t.legendgroup == "cases"]
     assert [(t.line.width, t.line.dash) for t in drawn] == [looks[kind] for kind in kinds]
+    n = numbers.count(MOTION["unstable"])
+    assert (f" Dashed: {n} points whose motion is unstable" in plot.caption) == ("Dashed" in plot.caption) == bool(n)
+    assert (" whose stability was not examined or not decided" in plot.caption) == ("stability not known" in kinds)
     (curve,) = [t for t in plot.figure.data if t.name == "response"]
     assert curve.mode == ("markers" if kinds else "lines+markers")
     # each step of the curve is drawn once

@@ -1,12 +1,16 @@
 """The exponentials of contact states that differ in a few springs, against those of the full matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from stickslip.errors import InputError
+from stickslip.model.matrices import lumped
 from stickslip.response.stability.flow_map import low_rank_flow
 from stickslip.response.stability.flow_map.contact_states import ContactStates
 from stickslip.response.stability.flow_map.low_rank_flow import HYPERBOLA, NODES, REACH, FullFlow, LowRankFlow, flow_of
-from stickslip.response.stability.flow_map.modal_states import ModalStates
+from stickslip.response.stability.flow_map.modal_states import ModalStates, modal_states
 from stickslip.response.stability.flow_map.propagation import transition
 
 N = 52  # coordinates
@@ -101,3 +105,10 @@ def test_a_motion_too_fast_for_a_number_says_so(stiffness: float) -> None:
     matrix = np.array([[0.0, 1.0], [-stiffness, -1.0]])
     with pytest.raises(FloatingPointError, match="too fast for a number"):
         transition(matrix, np.zeros((1, 0)), 1.0)
+
+
+def test_the_coordinate_without_mass_is_named():
+    body = lumped(np.ones(3), np.eye(3))
+    bare = replace(body, mass=np.diag([2.0, 0.0, 1.0]))
+    with pytest.raises(InputError, match=r"smallest diagonal entry 0 at node1\.x.*condense the massless ones"):
+        modal_states(bare, np.zeros((0, 3)), np.zeros(0), 1.0)

@@ -4,10 +4,11 @@ import errno
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -24,7 +25,8 @@ from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
-from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.folder import JOBS, empty_folder, locked_folder
+from stickslip.study.store.journal import AT_WORK
 from stickslip.study.store.netcdf import attributes_there, write_tree
 from stickslip.study.store.progress import LOG, written_down
 from stickslip.study.store.provenance import as_text
@@ -136,7 +138,8 @@ def test_a_limit_that_sqlite_meets_is_no_reason_to_delete_its_file(tmp_path: Pat
 import resource, signal, sys
 from pathlib import Path
 import numpy as np
-from stickslip.study.store.folder import locked_folder
+from stickslip.study.store.folder import JOBS, empty_folder, locked_folder
+from stickslip.study.store.journal import AT_WORK
 from stickslip.study.store.netcdf import attributes_there, write_tree
 from stickslip.study.store.progress import LOG, written_down
 from stickslip.study.store.provenance import as_text
@@ -199,3 +202,16 @@ def test_names_that_are_no_utf8_stand_in_log_and_result(
     tree = xr.DataTree(xr.Dataset(attrs={"study_file": as_text(name)}))
     write_tree(tree, tmp_path / "result.nc")
     assert attributes_there(tmp_path / "result.nc")["study_file"] == r"st\udcff.toml"
+
+
+def test_a_job_that_a_worker_still_writes_keeps_a_new_run_out(tmp_path: Path) -> None:
+    job, other = (tmp_path / JOBS / f"{name}{AT_WORK}" for name in ("at work", "left"))
+    job.parent.mkdir()
+    other.write_bytes(b"no database")
+    with closing(sqlite3.connect(job, isolation_level=None)) as worker:
+        worker.execute("begin exclusive")
+        with pytest.raises(InputError, match=re.escape(f"{tmp_path}: another run is at work in it")):
+            empty_folder(tmp_path)
+        assert set(tmp_path.glob("*/*")) >= {job, other}
+    empty_folder(tmp_path)
+    assert not list(tmp_path.glob("*/*"))

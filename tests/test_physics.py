@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.analyses.forced_response.physics.limits import Physics
 from stickslip.assembly.assembling import assemble
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
@@ -143,6 +144,12 @@ def test_what_friction_can_do_to_one_mass_is_its_describing_function():
     assert best.ends == pytest.approx(100.0, rel=1e-3)
     roots = np.sqrt([1e4 + 2e3 * complex_stiffness(x) for x in np.linspace(1.0, 50.0, 5000)])
     assert best.ratio == pytest.approx(np.max(roots.imag / np.abs(roots)), rel=0.05)  # 20 ratios
+    # a mode ends where friction leaves it, whatever other modes do; without friction at its own frequency
+    (mode,) = range_modes(found.system, found.load, Range(10 * HZ, 20 * HZ), springs)
+    other = replace(best, stuck=2.0 * best.stuck, ends=7.0)
+    physics = Physics((mode,), (), friction, (other, best), True)
+    assert physics.ends(mode) == best.ends
+    assert physics.ends(replace(mode, omega=3.0)) == 3.0
 
 
 def test_a_peak_that_nothing_damps_is_wrong():

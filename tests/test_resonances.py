@@ -14,6 +14,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.peak import PeakProblem
 from stickslip.model.matrices import lumped
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.curve import peak_curve
@@ -145,6 +146,25 @@ def test_a_curve_goes_round_the_fold_at_which_a_peak_ends():
             kinds = [p.is_maximum for p in found]
             assert all(kinds[:turned])
             assert not any(kinds[turned + 3 :])
+
+
+def test_evaluations_along_a_curve_are_those_of_its_corrections_and_five_to_align_it(monkeypatch):
+    calls, linearise = [], PeakProblem.linearise
+
+    def counted(problem, y, p):
+        calls.append(p)
+        return linearise(problem, y, p)
+
+    monkeypatch.setattr(PeakProblem, "linearise", counted)
+    system, load = oscillator(-0.5, 0.02, 0.02)
+    search = PeakSearch(system, load, "excitation", (0.5, 1.3), "phase_quadrature", 0, Discretisation(order=1))
+    told = []
+    for point in peak_curve(search, (0.5, 1.0), 5):
+        told.append((point.evaluations, len(calls)))
+        calls.clear()
+    assert len(told) > 4
+    # of the five that align the equation at a point one is among those counted
+    assert all(evaluations == corrections + 4 for evaluations, corrections in told[1:])
 
 
 def test_peaks_that_are_there_at_the_last_value_alone_are_followed_back():

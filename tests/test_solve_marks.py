@@ -129,6 +129,16 @@ def test_a_branch_goes_on_from_a_located_fold():
     assert onward[-1].x[0] == pytest.approx(points[-1].x[0], abs=1e-10)
 
 
+def test_on_a_straight_branch_a_mark_is_searched_without_a_correction():
+    line = Curve(lambda x, p: x - 2.0 * p, lambda _x, _p: 1.0, lambda _x, _p: -2.0)
+    following = along()
+    before, after = begin(line, 0.0, 0.0, following), begin(line, 2.0, 1.0, following)
+    bent = Mark(name="bent", value=lambda point: point.p**3 - 0.2)
+    found = located(line, before, after, bent, following)
+    assert found.p == pytest.approx(0.2 ** (1 / 3), abs=1e-9)
+    assert found.solution.iterations == 0, "the guess between two known points is the solution"
+
+
 def test_a_mark_that_cannot_be_located_says_why():
     # between the two points the residual is not a number
     hole = Curve(lambda x, p: np.nan if 0.1 < p < 0.9 else x - 1.0, lambda _x, _p: 1.0, lambda _x, _p: 0.0)

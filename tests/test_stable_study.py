@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import ALONE, Question
 from stickslip.analyses.forced_response.records.points import Response, collect
-from stickslip.analyses.forced_response.stability import examination, stable, with_stability
+from stickslip.analyses.forced_response.stability import examination, in_time, stable, with_stability
 from stickslip.analyses.forced_response.stability.examining import (
     CARRIED,
     examined_points,
@@ -546,3 +546,11 @@ def test_a_model_that_has_no_form_in_time_keeps_its_doubts(monkeypatch: pytest.M
     assert any(e.verdict == "undecided" for e in found)
     monkeypatch.setattr(with_stability, "integrated", refused)
     assert with_stability._doubts_in_time(asked, response, found, SimpleNamespace()) == found  # type: ignore[arg-type]
+
+
+def test_a_motion_that_comes_to_rest_has_steps_enough(monkeypatch):
+    monkeypatch.setattr(in_time, "integrated", lambda *_, **__: SimpleNamespace(final=None, settled=True))
+    monkeypatch.setattr(in_time, "_compared", lambda *_: SimpleNamespace(transient=0.0, steps=2 * STEPS))
+    asked = SimpleNamespace(problem=None, model=SimpleNamespace(load=None))
+    coarse, found = SimpleNamespace(transient=0.0, steps=STEPS), SimpleNamespace(final=None)
+    assert in_time._with_steps_enough(asked, None, None, found, coarse) == (coarse, found)

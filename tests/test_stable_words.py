@@ -5,7 +5,13 @@ import plotly.graph_objects as go
 import pytest
 import xarray as xr
 
-from stickslip.analyses.forced_response.stability.stable_words import FEW, MOST_SENTENCES, Point, stability_lines
+from stickslip.analyses.forced_response.stability.stable_words import (
+    FEW,
+    MOST_SENTENCES,
+    Point,
+    counts_line,
+    stability_lines,
+)
 from stickslip.analyses.residual_tractions.page import SECTION, Tractions, band, resonances
 from stickslip.response.bifurcations.found import Bifurcations
 from stickslip.response.stability.found import Floquet, Stability, modulus_text
@@ -81,3 +87,20 @@ def test_bounds_that_are_equal_are_no_band_and_no_tile() -> None:
     assert len(SECTION.cards(tractions(0.1))) == 1
     assert "The bounds are equal." in str(resonances(tractions(0.0)))
     assert "The bounds are equal." not in str(resonances(tractions(0.1)))
+
+
+@pytest.mark.parametrize(
+    ("basis", "said"),
+    [
+        ([1, 0, 2, 2, 3, 1], "Of 6 points 2 examined, 2 carried, 1 by sign; 1 not examined"),
+        ([2, 1, 1], "Of 3 points 2 examined, 1 carried"),
+        ([0, 0], "Of 2 points none examined; 2 not examined"),
+        ([1, 1, 1], ""),
+        ([-1, -1], ""),
+    ],
+)
+def test_points_are_counted_by_what_their_stability_rests_on(basis: list[int], said: str) -> None:
+    own = [*basis, 1]  # and a point of another case
+    case = [0] * len(basis) + [1]
+    data = xr.Dataset({"motion_stability_basis": ("point", own), "point_case": ("point", case)})
+    assert counts_line(data, 0) == said
