@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip.solve.linear import solve_dense
-from stickslip.solve.newton_method import Newton, newton
+from stickslip.solve.newton_method import MAX_STEPS_TO_HALVE, Newton, newton
 from stickslip.solve.status import Status
 
 pytestmark = pytest.mark.kernel
@@ -94,6 +94,17 @@ def test_too_many_iterations():
     solution = newton(scalar(lambda x: x**3, lambda x: 3 * x**2), np.array([1.0]), Newton(max_iterations=5))
     assert (solution.status, solution.iterations) == (Status.TOO_MANY_ITERATIONS, 5)
     assert solution.x[0] == pytest.approx((2 / 3) ** 5)
+
+
+@pytest.mark.parametrize(("power", "patient"), [(0.6, True), (0.52, False)])
+def test_a_start_near_a_solution_is_given_up_where_the_residual_is_not_halved(power, patient):
+    # |x|^p: each Newton step takes x to (1 - 1/p) x, so that the residual is halved in 3 steps (p = 0.6) or in 17 (p = 0.52)
+    slow = scalar(lambda x: np.sign(x) * abs(x) ** power, lambda x: power * abs(x) ** (power - 1.0))
+    options = Newton(max_iterations=500, tolerance=1e-6)
+    whole, near = (newton(slow, np.array([1.0]), own) for own in (options, options.near))
+    assert whole.status is Status.CONVERGED
+    assert near.iterations == (whole.iterations if patient else MAX_STEPS_TO_HALVE)
+    assert near.status is (Status.CONVERGED if patient else Status.STALLED)
 
 
 def test_stalled_where_no_step_helps():

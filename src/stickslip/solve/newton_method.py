@@ -23,6 +23,9 @@ GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {
     "levenberg_marquardt": LevenbergMarquardt,
 }
 
+# On two blades whose damper lifts off, starts with more harmonics converged in 111 of 154 attempts; 3 of these took more than 6 steps without
+# halving the residual, and two thirds of the time of the others fell after 6 such steps.
+MAX_STEPS_TO_HALVE = 6
 ROUNDING_REDUCTION = 0.1  # share of the residual after a step above which the residual may be rounding
 
 
@@ -37,6 +40,9 @@ class Newton:
         more, as with contacts a million times stiffer than the structure, the level of rounding applies.
     max_iterations
         Largest number of Newton steps.
+    patience
+        Newton steps within which the residual has to fall to a half; 0 for no such limit. For starts near a solution,
+        which converge at once or wander between kinks.
     globalisation
         Method for full Newton steps that do not reduce the residual: ``line_search`` shortens the step, ``dogleg``
         bends it towards the gradient (Powell), ``levenberg_marquardt`` damps directions of small singular values.
@@ -47,6 +53,7 @@ class Newton:
 
     tolerance: float = 1e-10
     max_iterations: int = 25
+    patience: int = 0
     globalisation: GlobalisationName = "line_search"
     linear: LinearSolver = Automatic()  # noqa: RUF009  # frozen
 
@@ -61,6 +68,11 @@ class Newton:
         most: Any = self.max_iterations
         if not isinstance(most, int | np.integer) or most < 1:
             raise input_error("Newton.max_iterations", f"must be an integer from 1 on, got {most!r}", "25 is usual.")
+
+    @property
+    def near(self) -> "Newton":
+        """The options for a start near a solution, given up after `MAX_STEPS_TO_HALVE` steps that do not halve the residual."""
+        return replace(self, patience=MAX_STEPS_TO_HALVE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +143,7 @@ def newton(
     globalisation = globalisation or GLOBALISATIONS[options.globalisation]()
     now = best = work.at(x)
     iterations = 0
+    halved, last = now.norm, 0  # residual that was last halved, and after how many steps
     status = _ended(now, iterations, options)
     while status is None:
         before = now.norm
@@ -142,9 +155,13 @@ def newton(
         now = after
         iterations += 1
         best = now if now.norm < best.norm else best
+        if now.norm <= 0.5 * halved:
+            halved, last = now.norm, iterations
         status = _ended(now, iterations, options)
         if status is None and now.norm > ROUNDING_REDUCTION * before and work.rounded(best):
             status = Status.CONVERGED
+        if status is None and options.patience and iterations - last >= options.patience:
+            status = Status.STALLED
     if not status.converged and work.rounded(best):
         status = Status.CONVERGED
     rung = Rung.DAMPED_STEP if work.rejected else Rung.FULL_STEPS

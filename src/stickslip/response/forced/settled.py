@@ -236,7 +236,7 @@ class _Settling:
                 yield lambda p=other: self._solved(balance, p, here)  # type: ignore[misc]
 
     def _solved(self, balance: Balance, start: ForcedPoint, here: ForcedPoint) -> ForcedPoint:
-        x, options = balance.unknowns(start.coefficients), self.problem.sweep.newton
+        x, options = balance.unknowns(start.coefficients), self.problem.sweep.newton.near
         found: Solution = newton(lambda v: balance.linearise(v, here.omega), x, options, NaturalLevel())
         return forced_point(balance, found, self.stages[1], here.index, here.omega, 0.0)
 

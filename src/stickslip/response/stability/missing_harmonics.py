@@ -79,7 +79,7 @@ def solved_with(problem: ForcedProblem, point: ForcedPoint, order: int) -> Corre
     """Return the motion of a point solved with harmonics up to an order; None without convergence."""
     high = _more(problem, harmonics_of(order))
     start = high.unknowns(point.coefficients)
-    found = newton(lambda x: high.linearise(x, point.omega), start, problem.sweep.newton)
+    found = newton(lambda x: high.linearise(x, point.omega), start, problem.sweep.newton.near)
     if not found.status.converged:
         return None
     work = max(found.iterations, 1) * newton_work(start.size)
