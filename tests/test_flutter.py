@@ -141,6 +141,9 @@ def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
     data = result.data["flutter"].isel(case=0)
     w, m = int(data["least_wave"]), int(data["least_mode"])
     assert float(data["damping"][w, m]) == float(data["damping"].min()) < 0
+    below = np.count_nonzero(data["damping"].values < float(data["required_damping"]))
+    assert below > 1
+    assert f"{below} waves and modes lie below the dashed line of " in page
     assert f"mode {m + 1} grows" in " ".join(told)
     calm = model(of_blade(influence())).flutter(number=1, required_percent=1.0)
     assert any("less damping than the 1 % required" in str(v) for v in calm.verdicts)

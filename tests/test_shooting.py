@@ -14,6 +14,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.stability.found import Floquet, floquet
+from stickslip.response.time import shooting
 from stickslip.response.time.period_map import PeriodMap, period_map
 from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
 from stickslip.response.time.start import TransientStart, rest
@@ -175,6 +176,15 @@ def test_friction_damped_oscillator_against_exact_event_driven_values(omega: flo
     assert abs(result.floquet.multipliers[-1]) < 1e-12
     assert result.floquet.neutral == 0
     assert result.contact_failures == 0
+
+
+def test_a_force_that_jumps_within_a_step_leaves_the_error_of_the_multipliers_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arguments = griffin_arguments(next(iter(GRIFFIN_EXACT)))
+    assert shoot(*arguments).growth_error == 0.0
+    monkeypatch.setattr(shooting, "_jumps", lambda _: True)
+    assert shoot(*arguments).growth_error == np.inf
 
 
 def plain_march(result: ShootingResult, arguments: tuple, start: TransientStart, periods: int):

@@ -16,7 +16,7 @@ from stickslip.solve.line_search import Kinks
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.status import Rung, Status
-from stickslip.solve.trust_region import damped_step
+from stickslip.solve.trust_region import _shorter, damped_step
 
 CORRECTORS = sorted(GLOBALISATIONS)
 
@@ -582,3 +582,12 @@ def test_rungs_are_counted_in_their_order():
         "HOMOTOPY",
         "IN_TIME",
     ]
+
+
+@pytest.mark.parametrize(
+    ("change", "slope", "factor"),
+    [(1.0, -1.0, 0.25), (0.0, -1.0, 0.5), (-0.5, -1.0, 0.5), (99.0, -1.0, 0.1), (-2.0, -1.0, 0.5), (np.nan, -1.0, 0.1)],
+)
+def test_a_step_is_shortened_to_the_minimum_of_the_parabola(change: float, slope: float, factor: float) -> None:
+    # change = slope + curvature / 2, least at -slope / curvature
+    assert _shorter(change, slope) == factor
