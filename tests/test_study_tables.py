@@ -122,7 +122,7 @@ def test_the_schema_lists_tables_and_keys():
 # none is meant by an empty list, or what reads it refuses it
 MAY_BE_EMPTY = {
     "Contact": {"along_t", "along_w", "along_n"},
-    "FileModel": {"clamped"},
+    "FileModel": {"at_speed", "clamped"},
     "FirstLoading": {"displacement", "force"},
     "Harmonics": {"low", "high", "alert_over"},
     "Lumped": {"names", "springs_n_per_m", "dashpots_n_s_per_m"},
@@ -530,7 +530,10 @@ def test_what_a_deck_contradicts_is_told_with_keys_of_the_study(changes, said, t
 
 def test_a_speed_of_what_no_speed_changes_is_refused(tmp_path):
     path = write_four_masses(tmp_path, {"rotation.speed_rpm": "100.0"})
-    with pytest.raises(InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh or a rigid body"):
+    with pytest.raises(
+        InputError,
+        match=r"rotation.speed_rpm: is 100, but no part is a mesh, a rigid body or matrices at several speeds",
+    ):
         read_study(path)
 
 
@@ -565,7 +568,7 @@ def test_modes_of_waves_of_a_large_sector_are_refused_beforehand(tmp_path):
 def test_a_campbell_diagram_of_masses_is_refused(tmp_path):
     changes = {"campbell.speeds_rpm": "[0.0, 100.0]\nengine_orders = [1]"}
     told = refused(write_four_masses(tmp_path, changes))
-    assert "campbell: needs a part that a speed changes, and none is a mesh." in told
+    assert "campbell: needs a part that a speed changes, and none is a mesh or has matrices at several speeds." in told
 
 
 def test_what_is_no_file_and_no_toml_is_told(tmp_path):

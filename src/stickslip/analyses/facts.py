@@ -77,4 +77,6 @@ def _in_words(model: Model, rpm: float) -> str:
         return "at rest"
     speed = "at each speed" if np.isnan(rpm) else f"{rpm:g} rpm"
     coriolis = "with" if model.coriolis else "without"
-    return f"{speed}, {model.tangent} tangent, {coriolis} Coriolis forces"
+    meshed = any(part.solid is not None for part in model.parts.values())
+    stiffness = "matrices of another program" if model.matrices_at_speed and not meshed else f"{model.tangent} tangent"
+    return f"{speed}, {stiffness}, {coriolis} Coriolis forces"

@@ -166,8 +166,13 @@ class Model:
 
     @property
     def rotates(self) -> bool:
-        """Whether the model depends on the speed: with meshes and rigid bodies, not with matrices alone."""
-        return any(part.body is not None for part in self.parts.values()) or self._has_mesh
+        """Whether the model depends on the speed: with meshes, rigid bodies and matrices at several speeds."""
+        return any(part.body is not None or part.follows_speed for part in self.parts.values())
+
+    @property
+    def matrices_at_speed(self) -> bool:
+        """Whether a part has matrices at several speeds from another program."""
+        return any(part.turning is not None for part in self.parts.values())
 
     @property
     def _has_mesh(self) -> bool:
@@ -177,7 +182,7 @@ class Model:
     def axis(self) -> Axis:
         """Axis of rotation of the first part that rotates."""
         every = list(self.parts.values())
-        turning = [part for part in every if part.solid is not None or part.sectors > 1]
+        turning = [part for part in every if part.follows_speed or part.sectors > 1]
         return (turning or every)[0].axis
 
     @cached_property

@@ -71,6 +71,12 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
         whole = part.place.then(place)
     mesh = None if template.mesh is None else moved_mesh(template.mesh, whole)
     structure = turned_structure(template.structure, whole)
+    if template.turning is not None and not whole.keeps(template.axis):
+        raise input_error(
+            "copy_of",
+            "the copy is not the original turned about the axis of rotation, so that its matrices at speed are others",
+            "Bring the matrices of that place as a part of their own.",
+        )
     solid = None
     if template.solid is not None and mesh is not None:
         solid = _moved_solid(template.solid, whole, structure)

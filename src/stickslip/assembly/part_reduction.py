@@ -133,6 +133,11 @@ def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structu
     """Return the full structure of a part at a speed."""
     if part.body is not None and spin.speed != 0.0:
         return part.body.at_speed(spin.speed, spin.axis, coriolis=spin.coriolis)
+    if part.turning is not None:
+        try:
+            return part.turning.at_speed(spin.speed, coriolis=spin.coriolis)
+        except InputError as error:
+            raise error.inside(f"part.{name}") from None
     if part.solid is None or spin.speed == 0.0:
         return part.structure
     try:
@@ -147,6 +152,8 @@ def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
     """Return the (n, n) derivative by Ω² of the stiffness of `at_speed`, N s²/m."""
     if part.body is not None:
         return scipy.sparse.csr_array(part.body.at_speed(1.0, spin.axis).stiffness)
+    if part.turning is not None:
+        return part.turning.by_square(spin.speed)
     if part.solid is None:
         return scipy.sparse.csr_array((part.structure.n, part.structure.n))
     found = part.solid.polynomial(rest.tie, tangent=spin.tangent, unit=rest.unit)
@@ -155,6 +162,8 @@ def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
 
 def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:
     """Return the (n,) load on a part's dofs that causes the displacement of steady rotation at a speed, N."""
+    if part.turning is not None:
+        return part.turning.static_load(spin.speed)
     if part.solid is None or spin.speed == 0.0:
         return np.zeros(part.structure.n)
     load = np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
@@ -226,13 +235,13 @@ def _root(part: Part, spin: Spin, rest: Steady) -> Part:
     """Return the part whose reduction a part shares."""
     if part.template is None or part.place is None or part.body is not None:
         return part
-    turns = part.solid is not None and spin.speed != 0.0
+    turns = part.follows_speed and spin.speed != 0.0
     alike = part.place.keeps(part.axis) and rest.unit is None
     return part if turns and not alike else part.template
 
 
 def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store) -> ReducedPart:
-    changes = part.solid is not None or part.body is not None
+    changes = part.follows_speed or part.body is not None
     spin, rest = turning if changes else (Spin(), ALONE)
     shared = None if rest.unit is None else rest.unit.tobytes()
     whole = store is with_ways_back
@@ -286,7 +295,7 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
         if part.reduction is None or part.body is not None:
             whole = full if part.damping is None else part.damping.of_modes(full)
             return ReducedPart(whole, np.arange(full.n), steady)
-        if spin.references and part.solid is not None and isinstance(part.reduction, Reduction):
+        if spin.references and part.follows_speed and isinstance(part.reduction, Reduction):
             known = [at_speed(name, part, other, rest) for other in spin.references]
             others = [modes_of(one, kept, part.reduction) for one in known]
             small = on_modes_of_others(full, kept, part.reduction, others)
@@ -316,6 +325,8 @@ def _placed(made: ReducedPart, part: Part) -> ReducedPart:
 def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
     solid = part.solid
     turning: tuple[object, ...] = ()
+    if part.turning is not None and spin.speed != 0.0:
+        turning = (spin, part.turning)
     if solid is not None and spin.speed != 0.0:
         mesh, material = solid.mesh, solid.material
         given = (material,) if not isinstance(material, list | tuple) else tuple(material)

@@ -115,6 +115,8 @@ def static_forces(model: Model, forces: Mapping[str, Matrix]) -> dict[str, Float
             if part.solid is not None:
                 own = model.speed**2 * part.solid.centrifugal
                 static["rotation.speed_rpm"][model.places.own(name)] = own
+            elif part.turning is not None:
+                static["rotation.speed_rpm"][model.places.own(name)] = part.turning.static_load(model.speed)
     return static
 
 

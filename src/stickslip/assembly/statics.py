@@ -45,11 +45,19 @@ def joined_displacements(
     moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
     tie = scipy.sparse.csr_array(tie[:, moves])
     stiffness = scipy.sparse.block_diag([scipy.sparse.csr_array(part.structure.stiffness) for part in parts.values()])
-    load = [np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal for p in parts.values()]
+    load = [_centrifugal(part) for part in parts.values()]
     solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
     moved = tie @ solve(tie.T @ np.concatenate(load))
     shared = {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}
     return shared | free
+
+
+def _centrifugal(part: Part) -> FloatArray:
+    """Return the (n,) centrifugal load at 1 rad/s, N s²; for matrices at several speeds the one of the highest over its square."""
+    if part.turning is not None:
+        highest = float(part.turning.speeds[-1])
+        return part.turning.static_load(highest) / highest**2
+    return np.zeros(part.structure.n) if part.solid is None else part.solid.centrifugal
 
 
 def _free_solids(places: Places, here: Neighbours | None, joins: Ties) -> dict[str, Steady]:

@@ -19,6 +19,9 @@ from .gyroscopic import GyroscopicModes as GyroscopicModes
 from .gyroscopic import gyroscopic_modes as gyroscopic_modes
 from .matrices import chain as chain
 from .matrices import lumped as lumped
+from .matrices_at_speeds import AtSpeed as AtSpeed
+from .matrices_at_speeds import SpeedMatrices as SpeedMatrices
+from .matrices_at_speeds import speed_matrices as speed_matrices
 from .mesh.blade_pair import mesh_blade_pair as mesh_blade_pair
 from .mesh.sector import Airfoil as Airfoil
 from .mesh.sector import DiskProfile as DiskProfile

@@ -13,6 +13,7 @@ from stickslip.model.damping import Damping
 from stickslip.model.fe.elements import EXACT, Rules
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.fe.solid import Materials
+from stickslip.model.matrices_at_speeds import SpeedMatrices
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
@@ -143,7 +144,10 @@ class Part:
     mesh
         Mesh for facets of surfaces and pictures; None for matrices, rigid bodies, lumped masses.
     solid
-        Rotating solid from which the structure was assembled; None if the structure does not depend on the speed.
+        Rotating solid from which the structure was assembled; None without a mesh.
+    turning
+        Matrices at several speeds, whose first is the structure; None if there are none. Without `solid` and `turning` the
+        structure does not depend on the speed.
     body
         Rigid body; None unless the part is rigid.
     surfaces
@@ -183,6 +187,7 @@ class Part:
     structure: Structure
     mesh: SolidMesh | None = None
     solid: RotatingSolid | None = None
+    turning: SpeedMatrices | None = None
     body: RigidBody | None = None
     surfaces: Mapping[str, BodyPoints] = field(default_factory=dict)
     drawn: BodySolid | None = None
@@ -221,6 +226,11 @@ class Part:
         """Drop cached values, which can be computed again."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
         return own | {"memo": {}}
+
+    @property
+    def follows_speed(self) -> bool:
+        """Whether the part is elastic and its matrices depend on the speed."""
+        return self.solid is not None or self.turning is not None
 
     @property
     def names(self) -> list[str]:

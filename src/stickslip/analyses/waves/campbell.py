@@ -60,7 +60,7 @@ def _inputs(case: Case, model: Model) -> Question:
         raise input_error(
             "campbell",
             "the model is matrices, which no speed changes",
-            "Bring the mesh (a deck or an archive of one material) instead of matrices.",
+            "Bring the mesh (a deck or an archive of one material), or matrices at several speeds (at_speed).",
         )
     wheel = Wheel(model.sectors, model.coriolis)
     wheel.require(asked.nodal_diameters, "campbell.nodal_diameters")

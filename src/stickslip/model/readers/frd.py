@@ -10,9 +10,10 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.readers.node_table import NodeTable, node_table
+from stickslip.model.readers.node_table import NodeTable, csv_nodes, node_table
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
 from stickslip.model.readers.units import SI, Units
+from stickslip.model.structure import Dofs
 
 # element type -> position of each of VTK's nodes in the file, which lists vertical edges before top ones
 HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
@@ -117,6 +118,47 @@ def read_frd(path: Path | str, *, units: Units = SI) -> FrdResults:
     nodes = replace(nodes, points=units.length * nodes.points)
     fields = tuple(_in_si(field, modal, units) for field, modal in reader.fields)
     return FrdResults(_mesh(nodes, reader.cells), nodes, fields)
+
+
+def read_displacement(path: Path, dofs: Dofs, units: Units) -> FloatArray:
+    """Return the static displacement of dofs from a file.
+
+    Parameters
+    ----------
+    path
+        An ``.frd`` file of CalculiX, of which the last field ``DISP`` counts, or CSV with the columns ``node, x, y, z``.
+    dofs
+        Displacements and rotations of nodes.
+    units
+        Unit system of the file.
+
+    Returns
+    -------
+    FloatArray
+        (n,) m; rotations, which such files lack, are zero.
+
+    Raises
+    ------
+    InputError
+        If a node is missing in the file.
+    """
+    if ".frd" in "".join(path.suffixes[-2:]).lower():
+        results = read_frd(path, units=units)
+        fields = [f for f in results.fields if f.name == "DISP" and f.frequency_hz is None]
+        if not fields:
+            raise input_error(
+                str(path), "has no static field DISP", "Write the displacements of the static step (*NODE FILE, U)."
+            )
+        table = node_table(fields[-1].nodes, fields[-1].values[:, :3], str(path))
+    else:
+        table = csv_nodes(path)
+        table = replace(table, points=units.length * table.points)
+    component = np.array(dofs.component)
+    moved = table.points[table.index(dofs.node)]
+    found = np.zeros(len(dofs))
+    for j, axis in enumerate(("x", "y", "z")):
+        found[component == axis] = moved[component == axis, j]
+    return found
 
 
 def frd_nodes(path: Path) -> NodeTable:

@@ -348,22 +348,22 @@ def _without_a_mesh(tables: Tables, home: Path) -> Iterator[InputError]:
     if getattr(asked, "campbell", None) is not None:
         yield input_error(
             "campbell",
-            "needs a part that a speed changes, and none is a mesh",
-            "Give a part a shape, a deck (.inp) or an archive (.cdb).",
+            "needs a part that a speed changes, and none is a mesh or has matrices at several speeds",
+            "Give a part a shape, a deck (.inp), an archive (.cdb), or matrices with the tables at_speed.",
         )
     still = tables.rotation.speed_rpm == 0 or any(isinstance(part, BODIES) for part in originals)
     if not still and not knows_speeds(tables.aero, home):
         yield input_error(
             "rotation.speed_rpm",
-            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh or a rigid body, and no aero.file has a column speed_rpm: "
-            "a speed changes nothing else",
-            "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
+            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh, a rigid body or matrices at several speeds, and no aero.file "
+            "has a column speed_rpm: a speed changes nothing else",
+            "Give 0, a mesh, or matrices with the tables at_speed. Matrices that were exported at one speed hold its effects already.",
         )
 
 
 def _turns(table: Any) -> bool:
     if isinstance(table, FileModel):
-        return table.file.lower().endswith(MESHES)
+        return bool(table.at_speed) or table.file.lower().endswith(MESHES)
     return isinstance(table, PrismBlades | Sector)
 
 

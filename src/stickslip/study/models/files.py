@@ -15,6 +15,7 @@ from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.hourglass import hourglass_doubts
 from stickslip.model.fe.solid import Material, Materials
+from stickslip.model.matrices_at_speeds import AtSpeed, SpeedMatrices, speed_matrices, warnings_of
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
 from stickslip.model.readers.ansys_archive import (
@@ -25,12 +26,14 @@ from stickslip.model.readers.ansys_archive import (
     read_ansys_materials,
 )
 from stickslip.model.readers.calculix_deck import Deck, held_like_partners, read_deck
+from stickslip.model.readers.frd import read_displacement
 from stickslip.model.readers.open_model import read_structure, refuse_other_models
 from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.parts import FileModel, SetTable
 from stickslip.study.own_code import called
+from stickslip.units import RPM
 
 EDGE = 1e-9  # enlargement of boxes and cylinders, over the size of the mesh, to include nodes on their faces
 
@@ -143,6 +146,12 @@ def file_part(key: str, table: FileModel, home: Path, material: Material | None,
     """
     path = home / table.file
     name = path.name.lower()
+    if table.at_speed and name.endswith(MESHES):
+        raise input_error(
+            f"{key}.at_speed",
+            "belongs to matrices, and the file is a mesh, which is assembled at any speed",
+            "Leave at_speed out, or give file matrices at rest.",
+        )
     try:
         if table.reader is not None:
             return _from_own_reader(key, table, home, material, others)
@@ -349,16 +358,43 @@ def _from_matrices(
     if table.damping is None and dissipates(structure):  # the file's damping counts, not the damping of the whole study
         others = {name: value for name, value in others.items() if name != "damping"}
     faces = _faces(key, table, structure.sets, sectors)
-    others["warnings"] = negative_damping(structure, table.file)
-    return structure_part(
-        structure, mesh=mesh, sectors=sectors, faces=faces, cyclic=_tied(table), axis=table.axis() or Axis(), **others
+    axis = table.axis() or Axis()
+    turning = _at_speeds(key, table, files, structure, axis) if table.at_speed else None
+    others["warnings"] = (
+        *negative_damping(structure, table.file),
+        *(() if turning is None else warnings_of(turning, key)),
     )
+    return structure_part(
+        structure, mesh=mesh, turning=turning, sectors=sectors, faces=faces, cyclic=_tied(table), axis=axis, **others
+    )
+
+
+def _at_speeds(key: str, table: FileModel, files: Mapping[str, Path], rest: Structure, axis: Axis) -> SpeedMatrices:
+    """Read the matrices at the speeds of a part; mass, nodes and sets are those of its own file."""
+    states = [AtSpeed(0.0, rest)]
+    for i, own in enumerate(table.at_speed):
+        here = {
+            name: files[f"at_speed[{i}].{name}"]
+            for name in ("file", "damping_matrix")
+            if f"at_speed[{i}].{name}" in files
+        }
+        shared = {name: files[name] for name in ("mesh", "mass", "nodes") if name in files}
+        there = _matrices(f"{key}.at_speed[{i}]", table, here | shared)
+        speed = RPM * own.speed_rpm
+        structure = replace(there, sets=rest.sets)
+        moved = files.get(f"at_speed[{i}].displacement")
+        displacement = None if moved is None else read_displacement(moved, structure.dofs, _units(table))
+        states.append(AtSpeed(speed, structure, displacement))
+    try:
+        return speed_matrices(states, axis, between=table.between)
+    except InputError as error:
+        raise error.inside(key) from None
 
 
 def _matrices(key: str, table: FileModel, files: Mapping[str, Path]) -> Structure:
     """Read matrices by the suffix of their file."""
     names = {"mesh": "mesh", "mass": "mass", "damping_matrix": "damping", "nodes": "nodes"}
-    beside = {names[name]: path for name, path in files.items() if name != "file"}
+    beside = {names[name]: path for name, path in files.items() if name in names}
     return read_structure(f"{key}.file", files["file"], units=_units(table), plausible=table.plausible, **beside)
 
 

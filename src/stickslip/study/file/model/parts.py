@@ -168,6 +168,22 @@ class Lumped(PartTable):
         raise custom_error(f"there is no mass {end!r}", did_you_mean(str(end), known), key)
 
 
+class SpeedTable(Section):
+    """Matrices of a part at one speed of rotation, on the dofs of its file, and the static displacement of this speed."""
+
+    speed_rpm: Positive = Field(description="speed in rpm")
+    file: FilePath = Field(
+        description="stiffness at this speed, with stress stiffening and spin softening, in a format of the part's file"
+    )
+    damping_matrix: FilePath | None = Field(
+        None, description="Coriolis matrix at this speed, if it is in a separate file"
+    )
+    displacement: FilePath | None = Field(
+        None,
+        description="static displacement of this speed: a .frd file of CalculiX, or CSV with the columns node, x, y, z in the file's unit of length",
+    )
+
+
 class FileModel(PartTable):
     """One sector, or a whole structure, from the files of a finite-element program."""
 
@@ -240,6 +256,16 @@ class FileModel(PartTable):
         None, description="with matrices in separate files: CSV of node, component, x, y, z of every row"
     )
 
+    at_speed: list[SpeedTable] = Field(
+        default_factory=list,
+        max_length=50,
+        description="with matrices: the tables [[part.NAME.at_speed]], the same part at two or more speeds; its own file is at rest",
+    )
+    between: Literal["polynomial", "pchip"] = Field(
+        "polynomial",
+        description="the stiffness between the speeds of at_speed: polynomial (of the square of the speed, exact for linear elasticity) or pchip (monotone pieces, where temperatures or contacts inside follow the speed)",
+    )
+
     @field_validator("reader")
     @classmethod
     def _is_code(cls, given: str | None, info: ValidationInfo) -> str | None:
@@ -259,6 +285,8 @@ class FileModel(PartTable):
     def files(self) -> dict[str, str]:
         """Return the keys that name files, and the file names."""
         named = {key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")}
+        for i, own in enumerate(self.at_speed):
+            named |= {f"at_speed[{i}].{key}": getattr(own, key) for key in ("file", "damping_matrix", "displacement")}
         return {key: name for key, name in named.items() if name is not None}
 
     def axis(self) -> Axis | None:
