@@ -11,6 +11,7 @@ from evidence.judges.planar_contact import Contact, judged
 from evidence.validation.case_b1_planar import TABLE, exact_stiffness
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.law import PAIRS
+from stickslip.contact.planar.trajectory import _next_width
 from stickslip.harmonic.aft import contact_forces
 
 seeds = st.integers(0, 2**32 - 1)
@@ -311,6 +312,13 @@ def test_threads_give_the_same_numbers(monkeypatch):
     many = evaluate(gaps, *laws, samples=16)
     for name in ("coefficients", "blocks", "force", "state"):
         assert np.array_equal(getattr(one, name), getattr(many, name))
+
+
+@pytest.mark.parametrize(("error", "factor"), [(1.0, 0.85), (256.0, 0.425), (1e30, 0.2), (1e-9, 1.8), (np.nan, 0.25)])
+def test_the_next_piece_follows_the_error_by_the_eighth_root(error, factor):
+    # of order 8, as the stages are; at least a fifth, at most 1.8 times, a quarter after what is no number
+    assert _next_width.py_func(2.0, error, 9.0) == pytest.approx(2.0 * factor, rel=1e-12)
+    assert _next_width.py_func(2.0, 1.0, 1.5) == 1.5
 
 
 # ---- derivatives ------------------------------------------------------------------------------------------------------
