@@ -8,7 +8,9 @@ import scipy.sparse
 from solid_models import box
 
 import stickslip as ss
+from evidence.models.annulus import annular_sector
 from stickslip.assembly.assembling import assemble
+from stickslip.assembly.part_reduction import Spin, at_speed
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.rotation import rotating_solid
@@ -256,3 +258,19 @@ def test_missing_displacements_are_a_doubt(blade):
     assert not own.static_load(SPEEDS[2]).any()
     (said,) = warnings_of(own, "part.blade")
     assert "static displacements of the speeds are not given" in said
+
+
+def test_a_sector_of_matrices_is_the_sector_that_wrote_them():
+    sectors = 9
+    mesh = annular_sector(0.1, 0.2, 0.02, sectors=sectors, divisions=(3, 3, 1))
+    one = ss.Model(parts={"disk": solid_part(mesh, STEEL, sectors=sectors)})
+    part, steady = one.parts["disk"], one.steady["disk"]
+    known = [
+        AtSpeed(s, at_speed("disk", part, Spin(s, coriolis=True), steady), steady.displacement(part, s) if s else None)
+        for s in SPEEDS
+    ]
+    made = structure_part(part.structure, turning=speed_matrices(known, part.axis), sectors=sectors, axis=part.axis)
+    other = ss.Model(parts={"disk": made})
+    for wave in (0, 2):
+        exact, found = (natural_frequencies(own.at(RPM * 7000.0, wave), 4) for own in (one, other))
+        np.testing.assert_allclose(found, exact, rtol=1e-8)
