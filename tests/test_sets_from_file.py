@@ -18,6 +18,7 @@ SETS = """
 ends = { pattern = "t?P*" }
 slab = { box_m = [[0.03, 1, 1], [0.07, 0, 0]] }
 ring = { cylinder_m = [[0.05, 0, 0], [0.2, 0, 0]], radius_m = [0.015, 0.025] }
+few = { nodes = [45, 30, 12] }
 both = { pattern = "tip", box_m = [[0, 0.01, -1], [1, 1, 1]] }
 """
 
@@ -41,6 +42,7 @@ def wanted(points):
         "ends": x > 0.0999,
         "slab": (x > 0.029) & (x < 0.071),
         "ring": (x > 0.049) & (from_axis > 0.0149) & (from_axis < 0.0251),
+        "few": np.isin(np.arange(len(points)), [11, 29, 44]),  # the deck counts from 1
         "both": (x > 0.0999) & (y > 0.0099),
     }
 
@@ -71,6 +73,7 @@ def test_sets_of_matrices_hold_the_dofs_of_what_is_picked(block, tmp_path):
         ),
         ('far = { pattern = "tpi*" }', r"sets\.far\.pattern: fits no set .*'tpi\*'.*TIP"),
         ("tip = { box_m = [[0, 0, 0], [1, 1, 1]] }", r"sets\.tip: is the name of a set of the file"),
+        ("far = { nodes = [12, 99, 100] }", r"sets\.far\.nodes: the file has no node 99 that moves, nor 1 more"),
         ("far = {}", r"sets\.far\.pattern: picks nothing"),
         ("far = { radius_m = [0, 1] }", r"sets\.far\.pattern: picks nothing"),
         ("far = { cylinder_m = [[0, 0, 0], [0, 0, 1]] }", r"sets\.far\.radius_m: is missing"),

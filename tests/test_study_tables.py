@@ -10,7 +10,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from small_v2 import EXAMPLES, write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
 
 from stickslip.contact.laws import LAWS
@@ -23,6 +23,7 @@ from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.analysis import named
 from stickslip.study.file.example import Kind, example_decks, example_text
 from stickslip.study.file.harmonics import Harmonics
+from stickslip.study.file.model.bodies import Direction
 from stickslip.study.file.model.contacts import ContactTable, keys_of
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
@@ -339,6 +340,7 @@ WRONG = [
     ({"load.shaker.ratio_of": '"load.pul"'}, "load.shaker.ratio_of: 'load.pul' is no load. Did you mean 'load.pull'?"),
     ({"load.shaker.engine_order": "3"}, "load.shaker.engine_order: is of a wheel, but no part is a sector of one."),
     ({"load.shaker.direction": '"q"'}, "load.shaker.direction: is no direction, got 'q'."),
+    ({"contact.flat.tangent": '"q"'}, "contact.flat.tangent: is no direction, got 'q'."),
     ({"load.shaker.harmonic": "0"}, "forced_response: has no harmonic load to respond to."),
     ({"load.shaker.harmonic": "2", "harmonics.low": "1"}, "load.shaker.harmonic: 2 is not kept by harmonics.low = 1."),
     (
@@ -563,6 +565,13 @@ def test_modes_of_waves_of_a_large_sector_are_refused_beforehand(tmp_path):
     # what was measured
     for nodes, gigabytes in ((37_683, 4.35), (99_500, 14.9)):
         assert waves_gb(nodes) == pytest.approx(gigabytes, rel=0.1)
+
+
+def test_axes_are_words_for_directions():
+    table = TypeAdapter(Direction)
+    assert table.validate_python("z") == [0.0, 0.0, 1.0]
+    assert table.validate_python("-x") == [-1.0, 0.0, 0.0]
+    assert table.validate_python([1.0, 2.0, 3.0]) == [1.0, 2.0, 3.0]
 
 
 def test_a_campbell_diagram_of_masses_is_refused(tmp_path):

@@ -39,7 +39,7 @@ EDGE = 1e-9  # enlargement of boxes and cylinders, over the size of the mesh, to
 
 
 def with_sets(
-    key: str, tables: Mapping[str, SetTable], points: FloatArray, known: Mapping[str, IntArray]
+    key: str, tables: Mapping[str, SetTable], points: FloatArray, numbers: IntArray, known: Mapping[str, IntArray]
 ) -> dict[str, IntArray]:
     """Return the sets of a file together with the sets that the study defines.
 
@@ -51,6 +51,8 @@ def with_sets(
         Set tables of the study by name.
     points
         (n, 3) positions in m of the nodes or dofs that sets refer to by index; NaN if unknown.
+    numbers
+        (n,) their node numbers in the file.
     known
         Sets of the file.
 
@@ -64,15 +66,26 @@ def with_sets(
         place = f"{key}.sets.{name}"
         if name.lower() in {own.lower() for own in known}:
             raise input_error(place, "is the name of a set of the file", "Choose a name that the file does not use.")
-        members = np.flatnonzero(_picked(place, table, points, known))
+        members = np.flatnonzero(_picked(place, table, points, numbers, known))
         if not members.size:
             raise _nothing(place, table, points)
         found[name] = members
     return found
 
 
-def _picked(place: str, table: SetTable, points: FloatArray, known: Mapping[str, IntArray]) -> BoolArray:
+def _picked(
+    place: str, table: SetTable, points: FloatArray, numbers: IntArray, known: Mapping[str, IntArray]
+) -> BoolArray:
     inside = np.ones(len(points), dtype=bool)
+    if table.nodes is not None:
+        missing = np.setdiff1d(table.nodes, numbers)
+        if missing.size:
+            raise input_error(
+                f"{place}.nodes",
+                f"the file has no node {missing[0]} that moves" + f", nor {missing.size - 1} more" * (missing.size > 1),
+                "Give node numbers of the file; clamped nodes of matrices are none.",
+            )
+        inside &= np.isin(numbers, table.nodes)
     edge = EDGE * float(np.ptp(_placed(points), axis=0).max(initial=0.0))
     if table.pattern is not None:
         names = [n for n in known if fnmatchcase(n.lower(), table.pattern.lower())]
@@ -106,7 +119,7 @@ def _nothing(place: str, table: SetTable, points: FloatArray) -> InputError:
     if not placed.size:
         return input_error(place, "picks none: no node has a place", "Give matrices their nodes.")
     low, high = (", ".join(f"{v:.5g}" for v in c) for c in (placed.min(axis=0), placed.max(axis=0)))
-    keys = [k for k in ("pattern", "box_m", "cylinder_m", "radius_m") if getattr(table, k) is not None]
+    keys = [k for k in ("nodes", "pattern", "box_m", "cylinder_m", "radius_m") if getattr(table, k) is not None]
     got = ", ".join(f"{k} = {getattr(table, k)!r}" for k in keys)
     return input_error(
         place,
@@ -206,7 +219,7 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, o
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     if deck.sectors is None and sectors > 1 and table.cyclic == "node_to_node":
-        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.node_sets)
+        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.numbers, deck.mesh.node_sets)
         low, high = (sets[name] for name in _faces(key, table, sets, sectors))
         deck = held_like_partners(deck, (low, high), table.axis() or deck.axis, sectors)
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
@@ -306,7 +319,7 @@ def _solid(
     clamped_sets: tuple[str, ...] = (),
     **others: Any,
 ) -> Part:
-    mesh = replace(mesh, node_sets=with_sets(key, table.sets, mesh.points, mesh.node_sets))
+    mesh = replace(mesh, node_sets=with_sets(key, table.sets, mesh.points, mesh.numbers, mesh.node_sets))
     faces = _faces(key, table, mesh.node_sets, sectors)
     free = _clamped(key, table, mesh)
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
@@ -348,7 +361,7 @@ def _from_matrices(
     sectors = _sectors(key, table)
     files = {name: home / file for name, file in table.files().items()}
     structure = _matrices(key, table, files) if own is None else own
-    picked = with_sets(key, table.sets, structure.dofs.position, structure.sets)
+    picked = with_sets(key, table.sets, structure.dofs.position, structure.dofs.node, structure.sets)
     structure = replace(structure, sets=picked)
     if table.plausible:
         refuse_indefinite(structure, str(files["file"]))

@@ -18,6 +18,21 @@ ALONG = 1e-6  # sine of the angle between a direction and the normal, below whic
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
+def axis_vector(given: Any) -> Any:
+    """Return the unit vector of an axis, with or without a sign; what is no word stays."""
+    if not isinstance(given, str):
+        return given
+    if given.removeprefix("-") not in AXES:
+        raise custom_error(
+            f"is no direction, got {shown(given)}", 'Give "x", "y", "z", "-x" ... or a vector [x, y, z].'
+        )
+    sign = -1.0 if given.startswith("-") else 1.0
+    return [sign * part for part in AXES[given.removeprefix("-")]]
+
+
+Direction = Annotated[Triple, BeforeValidator(axis_vector)]
+
+
 def shape(name: str) -> tuple[Any, Any]:
     """Return the key `shape` with the fixed value `name`."""
     return Literal[name], Field(description=f'shape = "{name}"')
@@ -95,13 +110,13 @@ class Surface(Section):
     points_m: list[Triple] = Field(
         min_length=1, max_length=10_000, description="positions [x, y, z] of its points in m"
     )
-    normal: Triple | None = Field(
-        None, description="direction [x, y, z] out of the body, the same at all points; or normals"
+    normal: Direction | None = Field(
+        None, description='direction "x", "-z" or [x, y, z] out of the body, the same at all points; or normals'
     )
-    normals: list[Triple] | None = Field(None, max_length=10_000, description="such a direction of each point")
-    tangent: Triple | None = Field(
+    normals: list[Direction] | None = Field(None, max_length=10_000, description="such a direction of each point")
+    tangent: Direction | None = Field(
         None,
-        description="direction whose part in the contact plane is the tangent t; left out: the axis nearest to the plane",
+        description='direction "x", "-z" or [x, y, z] whose part in the contact plane is the tangent t; left out: the axis nearest to the plane',
     )
     names: list[Name] | None = Field(
         None, max_length=10_000, description="names of the points; left out: NAME.1, NAME.2, ..."

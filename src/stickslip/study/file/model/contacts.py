@@ -20,7 +20,7 @@ from stickslip.contact.law import MEMBERS, ContactLaw
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import InputError, did_you_mean
-from stickslip.study.file.model.bodies import Triple
+from stickslip.study.file.model.bodies import Direction
 from stickslip.study.file.model.parts import union_of
 from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, own_object, shown
@@ -125,13 +125,13 @@ class ContactBase(Pair):
         "node_to_node",
         description="how points find their partners: node_to_node, node_to_segment or segment_to_segment",
     )
-    tangent: Triple | None = Field(
+    tangent: Direction | None = Field(
         None,
-        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: the surface's, allowed where the law is the same along t and w",
+        description='direction "x", "-z" or [x, y, z] whose part in the contact plane is the tangent t; left out: the surface\'s, allowed where the law is the same along t and w',
     )
-    normal: Triple | None = Field(
+    normal: Direction | None = Field(
         None,
-        description="direction [x, y, z] out of the first surface if its nodes span no facet, such as the tip of a beam; left out: the surface normals",
+        description='direction "x", "-z" or [x, y, z] out of the first surface if its nodes span no facet, such as the tip of a beam; left out: the surface normals',
     )
     acts: Literal["tangential", "normal"] | None = Field(
         None,

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from stickslip.response.forced.choices import AmplitudeOf
-from stickslip.study.file.model.bodies import AXES, Triple
+from stickslip.study.file.model.bodies import Triple, axis_vector
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -17,11 +17,9 @@ HIGHEST_ORDER = 1000
 
 def unit_direction(given: Any) -> Any:
     """Return the unit vector of a direction: an axis, with or without a sign, or a vector."""
+    given = axis_vector(given)
     if given is None:
         return None
-    if isinstance(given, str) and given.removeprefix("-") in AXES:
-        sign = -1.0 if given.startswith("-") else 1.0
-        return [sign * part for part in AXES[given.removeprefix("-")]]
     numbers = isinstance(given, list) and len(given) == 3
     if numbers and all(isinstance(v, float | int) and not isinstance(v, bool) for v in given):
         length = sum(v * v for v in given) ** 0.5

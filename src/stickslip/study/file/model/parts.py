@@ -11,7 +11,16 @@ from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, Bending
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
-from stickslip.study.file.model.bodies import Cylinder, FlatCurved, RigidBodyTable, Steps, Triple, Wedge, shape
+from stickslip.study.file.model.bodies import (
+    Cylinder,
+    Direction,
+    FlatCurved,
+    RigidBodyTable,
+    Steps,
+    Triple,
+    Wedge,
+    shape,
+)
 from stickslip.study.file.model.material import DampingTable, MaterialTable, ReductionTable
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, own_object, shown
@@ -22,6 +31,9 @@ Pair = Annotated[list[Triple], Field(min_length=2, max_length=2)]
 class SetTable(Section):
     """A node set: the nodes that satisfy all of its conditions."""
 
+    nodes: list[Annotated[int, Field(ge=0)]] | None = Field(
+        None, min_length=1, max_length=100_000, description="node numbers of the file"
+    )
     pattern: str | None = Field(
         None,
         min_length=1,
@@ -43,8 +55,9 @@ class SetTable(Section):
 
     @model_validator(mode="after")
     def _picks(self) -> Self:
-        if self.pattern is None and self.box_m is None and self.cylinder_m is None:
-            raise custom_error("picks nothing", "Give pattern, box_m, or cylinder_m with radius_m.", "pattern")
+        if self.nodes is None and self.pattern is None and self.box_m is None and self.cylinder_m is None:
+            raise custom_error("picks nothing", "Give nodes, pattern, box_m, or cylinder_m with radius_m.", "pattern")
+        once(self.nodes or [], "nodes")
         if (self.cylinder_m is None) != (self.radius_m is None):
             key = "cylinder_m" if self.cylinder_m is None else "radius_m"
             raise custom_error("is missing beside the other", "Give both or neither.", key)
@@ -222,9 +235,9 @@ class FileModel(PartTable):
         max_length=100,
         description="names of the node sets of a mesh that are held in all directions, beside what a deck holds itself",
     )
-    axis_direction: Triple | None = Field(
+    axis_direction: Direction | None = Field(
         None,
-        description="direction [x, y, z] of the axis of rotation; left out: as in the deck, or the z axis",
+        description='direction "x", "-z" or [x, y, z] of the axis of rotation; left out: as in the deck, or the z axis',
     )
     axis_origin_m: Triple = Field(
         [0.0, 0.0, 0.0],
