@@ -18,6 +18,9 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.matrices_at_speeds import AtSpeed, speed_matrices, warnings_of
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part, structure_part
+from stickslip.model.readers.frd import read_displacement
+from stickslip.model.readers.units import Units
+from stickslip.model.structure import Dofs, Structure
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
@@ -71,7 +74,7 @@ def test_between_the_speeds_the_matrices_are_those_of_the_solid(blade, speeds):
 def test_the_error_at_a_speed_left_out_is_told(blade):
     four, three = (speed_matrices(states(blade, s), AXIS) for s in (SPEEDS, SPEEDS[:3]))
     assert four.error < 1e-6
-    assert not warnings_of(four, "part.blade")
+    assert not warnings_of(four, "part.blade", AXIS)
     # a straight line through two speeds misses Ω⁴ K_2: at the middle x of [0, X] by K_2 x (X - x)
     exact = blade.polynomial(tangent="consistent")
     x, top = SPEEDS[1] ** 2, SPEEDS[2] ** 2
@@ -256,7 +259,7 @@ def test_missing_displacements_are_a_doubt(blade):
     bare = [replace(s, displacement=None) for s in states(blade)]
     own = speed_matrices(bare, AXIS)
     assert not own.static_load(SPEEDS[2]).any()
-    (said,) = warnings_of(own, "part.blade")
+    (said,) = warnings_of(own, "part.blade", AXIS)
     assert "static displacements of the speeds are not given" in said
 
 
@@ -274,3 +277,119 @@ def test_a_sector_of_matrices_is_the_sector_that_wrote_them():
     for wave in (0, 2):
         exact, found = (natural_frequencies(own.at(RPM * 7000.0, wave), 4) for own in (one, other))
         np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+def lattice(supports):
+    """Nodes on a regular grid with springs along its edges and diagonals, which the tension of a speed stiffens; held dofs removed."""
+    points = np.array([[x, y, z] for x in range(4) for y in range(3) for z in range(3)], dtype=float) * 0.05
+    n = len(points)
+    rest, tension = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
+    for i in range(n):
+        for j in range(i):
+            along = points[i] - points[j]
+            length = np.linalg.norm(along)
+            if length < 0.09:
+                pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+                block = np.outer(along, along) / length**2
+                where = np.ix_(*[[3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2]] * 2)
+                rest[where] += np.kron(pair, 1e6 * block)
+                tension[where] += np.kron(pair, (0.5 + points[i, 0]) * (np.eye(3) - block))
+    mass = np.eye(3 * n) * 0.2
+    kept = np.flatnonzero(~supports(points).ravel())
+    dofs = Dofs(
+        np.repeat(np.arange(n), 3)[kept], tuple(np.tile(["x", "y", "z"], n)[kept]), np.repeat(points, 3, axis=0)[kept]
+    )
+    return rest[np.ix_(kept, kept)], tension[np.ix_(kept, kept)], mass[np.ix_(kept, kept)], dofs
+
+
+@pytest.mark.parametrize("held", [(), (2,), (1, 2)])
+def test_supports_in_single_directions_are_no_other_content(held):
+    """Beside a plane of symmetry forces of a translation cancel at rest and not at speed."""
+
+    def supports(points):
+        own = np.repeat(points[:, :1] == 0.0, 3, axis=1)
+        for axis in held:
+            own[:, axis] |= points[:, axis] == 0.0
+        return own
+
+    rest, tension, mass, dofs = lattice(supports)
+    axis = Axis((0.0, 1.0, 1.0), (-0.3, 0.0, 0.0))
+    plane = np.eye(3) - np.outer(axis.unit, axis.unit)
+    spread = np.zeros((len(dofs), len(dofs)))
+    for i in range(len(dofs)):
+        for j in range(len(dofs)):
+            if dofs.node[i] == dofs.node[j]:
+                spread[i, j] = plane["xyz".index(dofs.component[i]), "xyz".index(dofs.component[j])]
+    none = np.zeros_like(rest)
+    made = [AtSpeed(s, Structure(mass, none, rest + s**2 * (tension - mass @ spread), dofs)) for s in SPEEDS]
+    assert speed_matrices(made, axis).error < 1e-9
+    with pytest.raises(InputError, match="of the spin softening that mass and speed have"):
+        speed_matrices(made, Axis())
+
+
+def test_consistent_masses_of_beams_hold_their_spin_softening_in_rotations_too():
+    """A beam along x about y: it softens by the mass of its motion along x and z, rotations included."""
+    size = 1.0
+    coupled = np.array([[54, -13 * size], [13 * size, -3 * size**2]]) / 420
+    stiff = np.array([[12, 6 * size], [6 * size, 4 * size**2]]), np.array([[12, -6 * size], [-6 * size, 4 * size**2]])
+    off = np.array([[-12, 6 * size], [-6 * size, 2 * size**2]])
+    n = 6
+    mass, rest = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
+    for i in range(n - 1):
+        a, b = slice(2 * i, 2 * i + 2), slice(2 * i + 2, 2 * i + 4)
+        rest[a, a] += 1e5 * stiff[0]
+        rest[b, b] += 1e5 * stiff[1]
+        rest[a, b] += 1e5 * off
+        rest[b, a] += 1e5 * off.T
+        mass[a, a] += np.array([[156, 22 * size], [22 * size, 4 * size**2]]) / 420
+        mass[b, b] += np.array([[156, -22 * size], [-22 * size, 4 * size**2]]) / 420
+        mass[a, b] += coupled
+        mass[b, a] += coupled.T
+    # free in bending along z with rotation; x and y of each node are springs to their neighbours with lumped mass
+    chain = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = chain[-1, -1] = 1.0
+    whole_m = np.zeros((4 * n, 4 * n))
+    whole_k = np.zeros((4 * n, 4 * n))
+    z = np.array([[4 * i + 2, 4 * i + 3] for i in range(n)]).ravel()
+    whole_m[np.ix_(z, z)], whole_k[np.ix_(z, z)] = mass, rest
+    for k in (0, 1):
+        own = 4 * np.arange(n) + k
+        whole_m[own, own] = 1.0
+        whole_k[np.ix_(own, own)] = 1e6 * chain
+    dofs = Dofs(
+        np.repeat(np.arange(n), 4), ("x", "y", "z", "ry") * n, np.repeat(np.arange(n) * [[size], [0], [0]], 4, axis=1).T
+    )
+    own = np.isin(np.array(dofs.component), ("x", "z", "ry"))
+    soft = whole_m * np.outer(own, own)
+    none = np.zeros_like(whole_m)
+    made = [AtSpeed(s, Structure(whole_m, none, whole_k - s**2 * soft, dofs)) for s in SPEEDS]
+    assert speed_matrices(made, Axis((0.0, 1.0, 0.0))).error < 1e-9
+
+
+@pytest.mark.parametrize(("factor", "ratio"), [(4.0, "4"), (-1.0, "-1"), (1000.0, "1e+03")])
+def test_a_displacement_of_another_speed_or_unit_is_a_doubt(blade, factor, ratio):
+    known = states(blade)
+    wrong = [*known[:2], replace(known[2], displacement=factor * known[2].displacement), known[3]]
+    (said,) = warnings_of(speed_matrices(wrong, AXIS), "part.blade", AXIS)
+    assert (
+        f"at_speed at 8000 rpm: the displacement is {ratio} times what the centrifugal load of this speed causes"
+        in said
+    )
+    with pytest.raises(InputError, match="at 8000 rpm: lacks the static displacement that other speeds have"):
+        speed_matrices([*known[:2], replace(known[2], displacement=None), known[3]], AXIS)
+    damped = replace(known[1].structure, damping=known[1].structure.damping + 1e-3 * blade.structure.mass)
+    own = speed_matrices([known[0], replace(known[1], structure=damped), *known[2:]], AXIS)
+    (said,) = warnings_of(own, "part.blade", AXIS)
+    assert "at 4000 rpm: the damping matrix dissipates otherwise than at rest" in said
+
+
+def test_rotations_of_a_displacement_are_read_or_missed(tmp_path):
+    dofs = Dofs(np.array([7, 7, 3]), ("x", "rz", "y"), np.zeros((3, 3)))
+    file = tmp_path / "u.csv"
+    file.write_text("node,x,y,z,rz\n7,1,2,3,0.5\n3,4,5,6,0.25\n")
+    np.testing.assert_allclose(read_displacement(file, dofs, Units.named("mm-t-s")), [1e-3, 0.5, 5e-3])
+    file.write_text("node,x,y,z\n7,1,2,3\n3,4,5,6\n")
+    with pytest.raises(InputError, match="has no rz, which the matrices have"):
+        read_displacement(file, dofs, Units.named("SI"))
+    with pytest.raises(InputError, match="lacks 1 nodes"):
+        read_displacement(file, replace(dofs, node=np.array([7, 7, 8]), component=("x", "y", "y")), Units.named("SI"))

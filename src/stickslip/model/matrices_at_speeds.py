@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.structure import Structure
@@ -28,6 +28,7 @@ TRANSLATED_RTOL = (
     1e-6  # force of a translation over the sum of its parts, below which no support or removed dof is near
 )
 MIN_SOFTENING = 1e-3  # share of the spin softening below which there is none; a speed in rpm for one in rad/s has 0.011
+WORK_RATIOS = (0.8, 1.25)  # of a static displacement, outside of which it is doubted
 CONTENT_RTOL = 0.02  # deviation of the spin softening from the mass that is refused
 
 
@@ -255,6 +256,13 @@ def speed_matrices(states: Sequence[AtSpeed], axis: Axis, *, between: Interpolat
     rest = ordered[0].structure
     for state in ordered:
         _check_dofs(rest, state)
+    lacking = [s.speed for s in ordered[1:] if s.displacement is None]
+    if 0 < len(lacking) < len(ordered) - 1:
+        raise input_error(
+            f"at_speed at {lacking[0] / RPM:.6g} rpm",
+            "lacks the static displacement that other speeds have",
+            "Give displacement at every speed, or at none.",
+        )
     found = SpeedMatrices(ordered, between)
     for state in ordered[1:]:
         _check_coriolis(found, state)
@@ -262,9 +270,21 @@ def speed_matrices(states: Sequence[AtSpeed], axis: Axis, *, between: Interpolat
     return found
 
 
-def warnings_of(own: SpeedMatrices, name: str) -> tuple[str, ...]:
+def warnings_of(own: SpeedMatrices, name: str, axis: Axis) -> tuple[str, ...]:
     """Return the warnings about a part known at some speeds."""
     found = []
+    for state in own.states[1:]:
+        place, ratio = f"{name}: at_speed at {state.speed / RPM:.6g} rpm", _work_ratio(own.rest, state, axis)
+        if ratio is not None and not WORK_RATIOS[0] <= ratio <= WORK_RATIOS[1]:
+            found.append(
+                f"{place}: the displacement is {ratio:.3g} times what the centrifugal load of this speed causes. Is it of this speed, in "
+                "the file's unit of length?"
+            )
+        even = state.structure.damping + state.structure.damping.T
+        if _norm(even - own.rest.damping - own.rest.damping.T) > SAME_MASS_RTOL * _norm(state.structure.damping):
+            found.append(
+                f"{place}: the damping matrix dissipates otherwise than at rest, which is not used: the damping at rest stays."
+            )
     if not own.has_displacements:
         found.append(
             f"{name}: static displacements of the speeds are not given, so that contacts get no centrifugal preload from it."
@@ -286,54 +306,87 @@ def warnings_of(own: SpeedMatrices, name: str) -> tuple[str, ...]:
 def refuse_other_content(rest: Structure, state: AtSpeed, axis: Axis) -> None:
     """Refuse matrices at a speed that do not hold the spin softening, or the Coriolis forces, of the mass.
 
-    Stress stiffening does no work on translations t. Away from supports ``(K(Ω) - K(0)) t = -Ω² P M t`` holds exactly, and ``C t =
-    2 Ω N M t``; P projects on the plane of rotation, N is the product with the axis. Another factor is another unit or content. Nothing is
-    refused where the digits of the files do not suffice.
+    Stress stiffening does no work on translations t. Away from supports ``(K(Ω) - K(0)) t = -Ω² M P t`` holds exactly, and ``C t = 2 Ω M N
+    t``; P projects on the plane of rotation, N is the product with the axis. Another factor is another unit or content. Nothing is refused
+    where the digits of the files do not suffice.
     """
     moves = _translations(rest)
     if moves is None:
         return
-    size = abs(rest.stiffness) @ np.ones(rest.n)
+    inside = _away_from_supports(rest, state, moves)
     held = np.asarray(rest.stiffness @ moves)
-    inside = np.all(np.abs(held) <= TRANSLATED_RTOL * size[:, None], axis=1)
-    loads = np.asarray(rest.mass @ moves)
     place = f"at_speed at {state.speed / RPM:.6g} rpm"
-    plane = axis.cross @ axis.cross  # -P
-    softened = state.speed**2 * np.stack([_of_nodes(rest, load, plane) for load in loads.T], axis=1)
+    softened = state.speed**2 * np.asarray(rest.mass @ (moves @ axis.cross @ axis.cross))
     change = np.asarray(state.structure.stiffness @ moves) - held
-    noise = float(np.linalg.norm(held[inside]))
-    share = _share(change[inside], softened[inside], noise)
-    if share is not None and abs(share) <= MIN_SOFTENING:
+    found = _apart(change[inside], softened[inside], float(np.linalg.norm(held[inside])))
+    if found is not None and abs(found.share) <= MIN_SOFTENING:
         raise input_error(
             place,
             "the stiffness lacks the spin softening of the mass",
             "Write the tangent stiffness of the rotating frame, with stress stiffening and spin softening.",
         )
-    if share is not None:
+    if found is not None:
         raise input_error(
             place,
-            f"the stiffness holds {share:.4g} of the spin softening that mass and speed have",
+            f"the stiffness holds {found.share:.4g} of the spin softening that mass and speed have, and {100 * found.rest:.3g} % beside it",
             "Check the unit of the speed, the mass, the axis, and that all matrices are of one model.",
         )
     skew = _skew(state)
     if skew is None:
         return
-    turned = 2.0 * np.stack([_of_nodes(rest, load, axis.cross) for load in loads.T], axis=1)
-    share = _share(np.asarray(skew @ moves)[inside], turned[inside], 0.0)
-    if share is not None:
+    turned = 2.0 * np.asarray(rest.mass @ (moves @ axis.cross))
+    found = _apart(np.asarray(skew @ moves)[inside], turned[inside], 0.0)
+    if found is not None:
         raise input_error(
             place,
-            f"the damping matrix holds {share:.4g} of the Coriolis forces that mass and speed have",
+            f"the damping matrix holds {found.share:.4g} of the Coriolis forces that mass and speed have, and {100 * found.rest:.3g} % beside it",
             "Check its sign, the unit of the speed and the axis, or leave damping_matrix out.",
         )
 
 
-def _share(given: FloatArray, expected: FloatArray, noise: float) -> float | None:
+def _away_from_supports(rest: Structure, state: AtSpeed, moves: FloatArray) -> BoolArray:
+    """Return the rows (n,) that no support touches: no force of a translation, and no node near that lacks a direction.
+
+    Beside a node that is held in one direction only, forces of a translation may cancel at rest and not at speed.
+    """
+    size = abs(rest.stiffness) @ np.ones(rest.n)
+    free = np.all(np.abs(rest.stiffness @ moves) <= TRANSLATED_RTOL * size[:, None], axis=1)
+    _, row = np.unique(rest.dofs.node, return_inverse=True)
+    partly = (np.bincount(row, moves.sum(axis=1)) < 3.0)[row].astype(float)
+    near = sum((abs(k) @ partly for k in (rest.stiffness, state.structure.stiffness)), partly)
+    return np.asarray(free & (near == 0.0))
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """Share of an expected matrix in a given one, and what the given one holds beside it, over the expected one."""
+
+    share: float
+    rest: float
+
+
+def _apart(given: FloatArray, expected: FloatArray, noise: float) -> _Apart | None:
     """Return the share of an expected matrix in a given one; None if they agree, or if the noise hides it."""
     size = float(np.linalg.norm(expected))
     if noise >= 0.5 * CONTENT_RTOL * size or np.linalg.norm(given - expected) <= CONTENT_RTOL * size:
         return None
-    return float(np.sum(given * expected)) / size**2
+    share = float(np.sum(given * expected)) / size**2
+    return _Apart(share, float(np.linalg.norm(given - share * expected)) / size)
+
+
+def _work_ratio(rest: Structure, state: AtSpeed, axis: Axis) -> float | None:
+    """Return the work of a static displacement against the stiffness at rest over its work by the centrifugal load.
+
+    It is one in linear statics. None without the displacement or the places of the nodes.
+    """
+    moves = _translations(rest)
+    if state.displacement is None or moves is None or not np.isfinite(rest.dofs.position).all():
+        return None
+    outward = -(rest.dofs.position - np.asarray(axis.origin)) @ axis.cross @ axis.cross
+    load = state.speed**2 * np.asarray(rest.mass @ np.sum(moves * outward, axis=1))
+    u = state.displacement
+    work = float(u @ load)
+    return float(u @ (rest.stiffness @ u)) / work if work else np.inf
 
 
 def _check_dofs(rest: Structure, state: AtSpeed) -> None:
@@ -388,21 +441,6 @@ def _translations(structure: Structure) -> FloatArray | None:
     component = np.array(structure.dofs.component)
     found = np.stack([component == axis for axis in PHYSICAL[:3]], axis=1).astype(float)
     return found if np.all(found.any(axis=0)) else None
-
-
-def _of_nodes(structure: Structure, forces: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return forces (n,) whose vector at each node is multiplied by a (3, 3) matrix."""
-    component = np.array(structure.dofs.component)
-    numbers, row = np.unique(structure.dofs.node, return_inverse=True)
-    vectors = np.zeros((len(numbers), 3))
-    own = [component == axis for axis in PHYSICAL[:3]]
-    for j, chosen in enumerate(own):
-        vectors[row[chosen], j] = forces[chosen]
-    vectors = vectors @ matrix.T
-    out = np.zeros(len(forces))
-    for j, chosen in enumerate(own):
-        out[chosen] = vectors[row[chosen], j]
-    return out
 
 
 def _positions(matrix: Matrix) -> IntArray:

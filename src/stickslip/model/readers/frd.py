@@ -10,8 +10,8 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.readers.node_table import NodeTable, csv_nodes, node_table
-from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
+from stickslip.model.readers.node_table import COMPONENTS, NodeTable, csv_columns, csv_numbers, node_table
+from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text, whole_numbers
 from stickslip.model.readers.units import SI, Units
 from stickslip.model.structure import Dofs
 
@@ -126,7 +126,8 @@ def read_displacement(path: Path, dofs: Dofs, units: Units) -> FloatArray:
     Parameters
     ----------
     path
-        An ``.frd`` file of CalculiX, of which the last field ``DISP`` counts, or CSV with the columns ``node, x, y, z``.
+        An ``.frd`` file of CalculiX, of which the last static field ``DISP`` counts, or CSV with the columns ``node, x, y, z``, and ``rx, ry,
+        rz`` in rad where the matrices have rotations.
     dofs
         Displacements and rotations of nodes.
     units
@@ -135,12 +136,12 @@ def read_displacement(path: Path, dofs: Dofs, units: Units) -> FloatArray:
     Returns
     -------
     FloatArray
-        (n,) m; rotations, which such files lack, are zero.
+        (n,) m and rad.
 
     Raises
     ------
     InputError
-        If a node is missing in the file.
+        If a node or a component is missing in the file.
     """
     if ".frd" in "".join(path.suffixes[-2:]).lower():
         results = read_frd(path, units=units)
@@ -149,16 +150,25 @@ def read_displacement(path: Path, dofs: Dofs, units: Units) -> FloatArray:
             raise input_error(
                 str(path), "has no static field DISP", "Write the displacements of the static step (*NODE FILE, U)."
             )
-        table = node_table(fields[-1].nodes, fields[-1].values[:, :3], str(path))
+        known: tuple[str, ...] = COMPONENTS[:3]
+        numbers, values = fields[-1].nodes, fields[-1].values[:, :3]
     else:
-        table = csv_nodes(path)
-        table = replace(table, points=units.length * table.points)
-    component = np.array(dofs.component)
-    moved = table.points[table.index(dofs.node)]
-    found = np.zeros(len(dofs))
-    for j, axis in enumerate(("x", "y", "z")):
-        found[component == axis] = moved[component == axis, j]
-    return found
+        columns = csv_columns(path, ("node", "x", "y", "z"))
+        known = tuple(c for c in COMPONENTS if c in columns)
+        numbers = whole_numbers(path, csv_numbers(path, "node", columns["node"])[:, None], ("node",))[:, 0]
+        factor = [units.length if c in COMPONENTS[:3] else 1.0 for c in known]
+        values = np.column_stack([csv_numbers(path, c, columns[c]) for c in known]) * factor
+    lacking = [c for c in dict.fromkeys(dofs.component) if c not in known]
+    if lacking:
+        raise input_error(
+            str(path),
+            f"has no {lacking[0]}, which the matrices have",
+            "Give CSV with the columns node, x, y, z, rx, ry, rz; rotations in rad.",
+        )
+    node_table(numbers, np.zeros((len(numbers), 3)), str(path)).index(dofs.node)  # refuses missing nodes
+    order = np.argsort(numbers, kind="stable")
+    row = order[np.searchsorted(numbers[order], dofs.node)]
+    return np.asarray(values[row, [known.index(c) for c in dofs.component]])
 
 
 def frd_nodes(path: Path) -> NodeTable:

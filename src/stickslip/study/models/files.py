@@ -375,7 +375,7 @@ def _from_matrices(
     turning = _at_speeds(key, table, files, structure, axis) if table.at_speed else None
     others["warnings"] = (
         *negative_damping(structure, table.file),
-        *(() if turning is None else warnings_of(turning, key)),
+        *(() if turning is None else warnings_of(turning, key, axis)),
     )
     return structure_part(
         structure, mesh=mesh, turning=turning, sectors=sectors, faces=faces, cyclic=_tied(table), axis=axis, **others
