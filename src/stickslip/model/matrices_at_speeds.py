@@ -77,11 +77,6 @@ class SpeedMatrices:
         return np.array([s.speed for s in self.states])
 
     @property
-    def has_coriolis(self) -> bool:
-        """Whether a Coriolis matrix is known."""
-        return self.coriolis is not None
-
-    @property
     def has_displacements(self) -> bool:
         """Whether the static displacement of every speed is known."""
         return all(s.displacement is not None for s in self.states[1:])
@@ -266,7 +261,7 @@ def speed_matrices(states: Sequence[AtSpeed], axis: Axis, *, between: Interpolat
     found = SpeedMatrices(ordered, between)
     for state in ordered[1:]:
         _check_coriolis(found, state)
-        refuse_other_content(rest, state, axis)
+        _refuse_other_content(rest, state, axis)
     return found
 
 
@@ -303,7 +298,7 @@ def warnings_of(own: SpeedMatrices, name: str, axis: Axis) -> tuple[str, ...]:
     return tuple(found)
 
 
-def refuse_other_content(rest: Structure, state: AtSpeed, axis: Axis) -> None:
+def _refuse_other_content(rest: Structure, state: AtSpeed, axis: Axis) -> None:
     """Refuse matrices at a speed that do not hold the spin softening, or the Coriolis forces, of the mass.
 
     Stress stiffening does no work on translations t. Away from supports ``(K(Ω) - K(0)) t = -Ω² M P t`` holds exactly, and ``C t = 2 Ω M N
