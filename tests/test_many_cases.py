@@ -20,6 +20,7 @@ from stickslip.analyses.forced_response.verdicts.working_range import WorkingRan
 from stickslip.report.cases import cases_of, families_of
 from stickslip.report.content import Words
 from stickslip.report.paper.figure import draw
+from stickslip.study.file.case_names import Naming
 from stickslip.study.varied import families
 
 FORCE, MASS, MU = "load.shaker.force_n", "part.damper.mass_kg", "contact.flat.friction_coefficient"
@@ -60,7 +61,7 @@ def test_keys_that_run_together_make_one_curve_under_the_names_of_the_others() -
     assert plot is not None
     assert [len(trace.x) for trace in plot.figure.data] == [4, 4, 4, 4]
     assert [trace.name for trace in plot.figure.data if trace.showlegend] == ["mu 0.3", "mu 0.5"]
-    assert plot.figure.layout.xaxis2.title.text == "mass (kg)"
+    assert plot.figure.layout.xaxis2.title.text == "mass (g)"
 
 
 def test_a_key_that_rises_and_falls_beside_another_does_not_run_with_it() -> None:
@@ -210,7 +211,9 @@ def test_the_keys_of_a_single_curve_stand_in_one_row_and_name_no_curve() -> None
 
 def test_curves_of_which_the_same_is_told_share_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     names = [f"limit {limit} N, gap {gap} mm" for limit in (1, 2) for gap in (3, 4)]
-    curves = tuple(WorkingRange((), (), "force" if "limit 1" in name else "mass", others=name) for name in names)
+    curves = tuple(
+        WorkingRange((), (), Naming("force" if "limit 1" in name else "mass", ""), others=name) for name in names
+    )
     monkeypatch.setattr(working_range, "working_ranges", lambda _: curves)
     lines = working_range.range_lines(xr.Dataset())
     assert lines == (

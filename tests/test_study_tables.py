@@ -21,6 +21,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector, Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.analysis import named
+from stickslip.study.file.case_names import namings
 from stickslip.study.file.example import Kind, example_decks, example_text
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.bodies import Direction
@@ -640,10 +641,40 @@ def test_names_of_cases_may_be_given(tmp_path):
 def test_names_of_cases_are_the_shortest_that_tell_them_apart(tmp_path):
     doubled = ["[[vary]]", "load.shaker.force_n = [1.0, 1.0]", "contact.brake.slip_limit_n = [3.0, 4.0]"]
     assert labels_of(tmp_path, *doubled) == ["slip limit 3 N", "slip limit 4 N"]
-    twice = ["[[vary]]", "contact.brake.slip_limit_n = [3.0]", "[[vary]]", "contact.link.slip_limit_n = [1.0, 2.0]"]
+    twice = [
+        "[[vary]]",
+        "contact.brake.slip_limit_n = [3.0, 4.0]",
+        "[[vary]]",
+        "contact.link.slip_limit_n = [1.0, 2.0]",
+    ]
     assert labels_of(tmp_path, *twice)[1] == "brake slip limit 3 N, link slip limit 2 N"
+    fixed = ["[[vary]]", "contact.brake.slip_limit_n = [3.0]", "[[vary]]", "contact.link.slip_limit_n = [1.0, 2.0]"]
+    assert labels_of(tmp_path, *fixed) == ["slip limit 1 N", "slip limit 2 N"]
+    assert labels_of(tmp_path, *fixed[:2]) == ["slip limit 3 N"]
     close = ["[vary]", "load.shaker.force_n = [1.0000001, 1.0000002, 2.0]"]
     assert labels_of(tmp_path, *close) == ["force 1.0000001 N", "force 1.0000002 N", "force 2 N"]
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "names"),
+    [
+        ("part.damper.mass_kg", [0.005, 0.01, 0.02], ["mass 5 g", "mass 10 g", "mass 20 g"]),
+        ("part.damper.masses_kg", [[0.01], [0.02]], ["masses 10 g", "masses 20 g"]),
+        ("part.damper.masses_kg", [[0.01, 0.02]], ["masses [10 20] g"]),
+        ("load.pull.force_n", [20000, 50000], ["force 20 kN", "force 50 kN"]),
+        ("load.pull.force_n", [500, 1000, 2000], ["force 500 N", "force 1000 N", "force 2000 N"]),
+        ("load.pull.force_n", [0.05, 0.1], ["force 0.05 N", "force 0.1 N"]),
+        ("contact.a.normal_stiffness_n_per_m", [2e4, 1e5], ["normal stiffness 20 N/mm", "normal stiffness 100 N/mm"]),
+        ("contact.a.normal_stiffness_n_per_m", [4.5e8], ["normal stiffness 450 N/µm"]),
+        ("contact.a.gap_m", [0, 1e-4, 0.0025], ["gap 0 mm", "gap 0.1 mm", "gap 2.5 mm"]),
+        ("material.young_modulus_pa", [2.1e11], ["young modulus 210 GPa"]),
+        ("contact.a.law", ["jenkins", "iwan"], ["law jenkins", "law iwan"]),
+        ("rotation.speed_rpm", [3000.0, 12000.0], ["speed 3000 rpm", "speed 12000 rpm"]),
+    ],
+)
+def test_numbers_in_names_have_the_prefix_that_an_engineer_writes(key, values, names):
+    found = namings({key: values})[key]
+    assert [found.name(value) for value in values] == names
 
 
 @pytest.mark.parametrize(

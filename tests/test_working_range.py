@@ -26,6 +26,7 @@ from stickslip.analyses.forced_response.verdicts.working_range import (
     working_range,
     working_ranges,
 )
+from stickslip.study.file.case_names import Naming
 
 MASS, SPRING, DASHPOT, STIFFNESS, LIMIT = 1.0, 4e4, 4.0, 2e4, 2.0  # kg, N/m, N s/m, N/m, N
 KEY = "load.shaker.force_n"
@@ -258,7 +259,7 @@ def test_the_stuck_end_is_told_by_what_is_varied_and_not_by_small_differences_of
     assert sticks_at(peaks, key) == end
     found = working_range(peaks, key)
     assert found is not None
-    own = replace(found, word="ratio")
+    own = replace(found, naming=Naming("ratio", ""))
     if end is None:
         (told,) = range_sentences(own)
         assert told.startswith("Where friction works cannot be told from these values of ratio: ")

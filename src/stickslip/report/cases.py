@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.report.plot import ramp
-from stickslip.study.varied import assigned_of, families, first_varied_number, key_name, varied_values
+from stickslip.study.varied import assigned_of, families, first_varied_number, varied_values
 
 CASE = "case"  # heading of legends and columns
 
@@ -64,12 +64,6 @@ def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
     """Return the first varied key whose values are numbers, and its values (case,); NaN if there is none."""
     key, values = first_varied_number(data)
     return key, values
-
-
-def axis_name(data: xr.Dataset, key: str) -> str:
-    """Return a varied key as the title of an axis: ``force (N)``."""
-    word, unit = key_name(data, key)
-    return f"{word} ({unit})" if unit else word
 
 
 def families_of(data: xr.Dataset, key: str, cases: Sequence[ShownCase]) -> dict[str, list[ShownCase]]:

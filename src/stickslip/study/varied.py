@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray
-from stickslip.study.file.case_names import JOINT, assignments, key_words
+from stickslip.study.file.case_names import JOINT, Naming, assignments, namings
 
 
 def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
@@ -37,10 +37,17 @@ def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
     return "", np.full(len(values), np.nan)
 
 
-def key_name(data: xr.Dataset, key: str) -> tuple[str, str]:
-    """Return word and unit of a varied key, as in names of cases: ``force``, ``N``."""
-    keys = varied_values(data)[0]
-    return key_words(keys if key in keys else [key])[key]
+def naming_of(data: xr.Dataset, key: str) -> Naming:
+    """Return word, unit and power of ten of a varied key, as in names of cases."""
+    keys, values = varied_values(data)
+    if key not in keys:
+        return namings({key: []})[key]
+    return namings({k: [_as_given(v) for v in column] for k, column in zip(keys, values.T, strict=True)})[key]
+
+
+def _as_given(value: object) -> object:
+    number = as_number(value)
+    return str(value) if np.isnan(number) else number
 
 
 def families(data: xr.Dataset, key: str) -> dict[str, list[int]]:
@@ -82,4 +89,4 @@ def _shared_names(labels: Sequence[str], groups: Sequence[Sequence[int]]) -> lis
 
 def assigned_of(values: Mapping[str, object]) -> tuple[str, ...]:
     """Return the varied keys of a case with their values as text: ``load.shaker.force_n = 3``."""
-    return assignments({k: str(v) if np.isnan(as_number(v)) else as_number(v) for k, v in values.items()})
+    return assignments({k: _as_given(v) for k, v in values.items()})

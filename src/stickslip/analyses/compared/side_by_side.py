@@ -13,7 +13,7 @@ from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import Chapter, Placing, page_html
 from stickslip.report.plot import BROKEN, COLOURS, DASHES, INK, MUTED, Plot, log_ticks, styled
@@ -30,6 +30,7 @@ from stickslip.report.quantities import (
     scale_for,
 )
 from stickslip.report.section import Card, Content
+from stickslip.study.varied import naming_of
 from stickslip.study.verdict import POINT_LEVELS, UNSTABLE, conclusion
 
 _BEST = "best of each"
@@ -173,6 +174,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
         return None
     if max(len(families_of(r.data, key, r.peaked)) for _, r in told) > FEW:
         return _differences_of_peaks(told, key, divided=divided)
+    naming = naming_of(told[0][1].data, key)
     figure, heights = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38]), []
     curves = []
     for design, response in told:
@@ -182,7 +184,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
             heights.append(peak)
             name = ", ".join(filter(None, (design.name, others)))
             drawn_as = {"color": design.colour, "width": 1.8, "dash": DASHES[k % len(DASHES)]}
-            values, hz = [c.value for c in cases], [response.peak_hz(c) for c in cases]
+            values, hz = [naming.shown(c.value) for c in cases], [response.peak_hz(c) for c in cases]
             curves.append((name, drawn_as, values, peak, hz))
     unit_drawn = unit_of(designs, divided=divided)
     scale = scale_for(np.concatenate(heights), unit_drawn)
@@ -204,13 +206,16 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     every = [value for _, _, own, _, _ in curves for value in own]
     wide = min(every) > 0 and max(every) > 5 * min(every)
     figure.update_xaxes(type="log" if wide else "linear")
-    figure.update_xaxes(title_text=axis_name(told[0][1].data, key), row=2)
+    figure.update_xaxes(title_text=naming.title, row=2)
     drawn = scale.factor * np.concatenate(heights)
     over = " / force" if divided else ""
     figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), row=1)
     figure.update_yaxes(title_text="peak frequency (Hz)", row=2)
     lowest = min(((float(np.nanmin(p)), n, v[int(np.nanargmin(p))]) for n, _, v, p, _ in curves), key=lambda t: t[0])
-    caption = f"Peak and its frequency over {axis_name(told[0][1].data, key)}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
+    caption = (
+        f"Peak and its frequency over {naming.title}. The smallest peak of all belongs to {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)} {naming.unit}".rstrip()
+        + "."
+    )
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
 
@@ -225,6 +230,7 @@ def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, 
         return None
     names = list(dict.fromkeys(families[row.case][0] for row in rows))
     values = sorted({families[row.case][1] for row in rows})
+    naming = naming_of(told[0][1].data, key)
     figure = make_subplots(1, len(later), shared_yaxes=True, subplot_titles=later, horizontal_spacing=0.03)
     most = max(abs(row.off_percent) for row in rows) or 1.0
     for k, design in enumerate(later, 1):
@@ -233,7 +239,7 @@ def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, 
             if row.design == design:
                 off[names.index(families[row.case][0]), values.index(families[row.case][1])] = row.off_percent
         cells = go.Heatmap(
-            x=[number(v, 4) for v in values],
+            x=[number(naming.shown(v), 4) for v in values],
             y=names,
             z=off,
             text=[[number(v, 2) if np.isfinite(v) else "" for v in line] for line in off],
@@ -247,7 +253,7 @@ def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, 
         )
         figure.add_trace(cells, 1, k)
     styled(figure, 170 + 26 * len(names))
-    figure.update_xaxes(type="category", title_text=axis_name(told[0][1].data, key))
+    figure.update_xaxes(type="category", title_text=naming.title)
     figure.update_yaxes(type="category", autorange="reversed")
     worst, best = (pick(rows, key=lambda row: row.off_percent) for pick in (max, min))
     text = f"Peak of each case over the one of {told[0][0].name}, in percent. Largest: {number(worst.off_percent)} % ({worst.design}, {worst.case}); smallest: {number(best.off_percent)} % ({best.design}, {best.case})."

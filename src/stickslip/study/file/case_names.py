@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 from stickslip.study.file.suffixes import split_units
@@ -9,33 +10,122 @@ from stickslip.study.file.suffixes import split_units
 Values = Mapping[str, Any]  # varied key -> value
 JOINT = ", "  # separator of the parts of a name
 DIGITS, MOST_DIGITS = 6, 17  # usual and largest number of digits of a value
+LEAST_SHOWN, MOST_SHOWN = 0.1, 1e4  # outside of these a number is easier to read with another prefix of its unit
+# unit of a key -> units with other prefixes that engineers write, with the power of ten of their numbers
+PREFIXED: dict[str, dict[str, int]] = {
+    "kg": {"g": 3, "t": -3},
+    "m": {"mm": 3, "µm": 6},
+    "mm": {"µm": 3, "m": -3},
+    "m²": {"mm²": 6},
+    "s": {"ms": 3},
+    "N": {"kN": -3},
+    "N m": {"kN m": -3},
+    "Pa": {"MPa": -6, "GPa": -9, "kPa": -3},
+    "Hz": {"kHz": -3},
+    "kg m²": {"kg mm²": 6},
+    "N/m": {"N/mm": -3, "N/µm": -6},
+    "N/m³": {"N/mm³": -9},
+}
 
 
 @dataclass(frozen=True)
 class Naming:
-    """Format of a varied key in names: its word, its unit, and the digits of its values."""
+    """Format of a varied key in names and along axes.
+
+    Parameters
+    ----------
+    word
+        The key in words.
+    unit
+        Unit that an engineer writes; empty for none.
+    digits
+        Digits of the values.
+    tens
+        Power of ten from the values of the key to numbers in `unit`.
+    """
 
     word: str
     unit: str
-    digits: int
+    digits: int = DIGITS
+    tens: int = 0
+
+    @property
+    def title(self) -> str:
+        """The title of an axis: ``force (N)``."""
+        return f"{self.word} ({self.unit})" if self.unit else self.word
+
+    def shown(self, value: Any) -> Any:
+        """Return a value of the key, or a list of them, in `unit`: ``0.01`` -> ``10.0`` for ``g``; texts stay."""
+        if isinstance(value, list):
+            return [self.shown(v) for v in value]
+        if not self.tens or not _is_number(value):
+            return value
+        return float(Decimal(repr(float(value))).scaleb(self.tens))
+
+    def value(self, value: Any) -> str:
+        """Return a value with its unit: ``10 g``."""
+        return " ".join(filter(None, (written(self.shown(value), self.digits), self.unit)))
+
+    def name(self, value: Any) -> str:
+        """Return the key with a value: ``mass 10 g``."""
+        return f"{self.word} {self.value(value)}"
 
 
 def short_names(tables: Sequence[Sequence[Values]]) -> dict[str, Naming]:
-    """Return the naming of each varied key that names need: ``load.shaker.force_n`` -> ``force``, ``N``.
+    """Return the naming of each varied key that names need: ``load.shaker.force_n`` -> ``force``, ``N`` or ``kN``.
 
-    Among keys that vary together, the first one whose values all differ is enough; without such a key all are needed.
+    Among keys that vary together, the first one whose values all differ is enough; without such a key all are needed. A table with a
+    single row is needed where no table has more.
 
     Parameters
     ----------
     tables
         Rows of values for each table of [vary].
     """
-    words = key_words([key for rows in tables for key in _telling(rows)])
-    column = {key: [row[key] for row in rows] for rows in tables for key in _telling(rows)}
-    return {key: Naming(word, unit, _digits(column[key])) for key, (word, unit) in words.items()}
+    several = [rows for rows in tables if len(rows) > 1] or tables
+    return namings({key: [row[key] for row in rows] for rows in several for key in _telling(rows)})
 
 
-def key_words(keys: Sequence[str]) -> dict[str, tuple[str, str]]:
+def namings(columns: Mapping[str, Sequence[Any]]) -> dict[str, Naming]:
+    """Return the naming of each key by its values: ``part.damper.mass_kg`` with 0.005 and 0.01 -> ``mass``, ``g``.
+
+    All values of a key have one unit. It is the unit of the key, unless another prefix leaves fewer numbers below 0.1 or from 10 000 on;
+    among several prefixes the one with the shortest numbers is taken.
+
+    Parameters
+    ----------
+    columns
+        Varied keys with their values.
+    """
+    words = _key_words(list(columns))
+    return {key: _naming(*words[key], values) for key, values in columns.items()}
+
+
+def _naming(word: str, unit: str, values: Sequence[Any]) -> Naming:
+    own = Naming(word, unit, _digits(values))
+    entries = [entry for value in values for entry in (value if isinstance(value, list) else [value])]
+    if not all(map(_is_number, entries)):
+        return own
+    choices = [own, *(Naming(word, name, own.digits, tens) for name, tens in PREFIXED.get(unit, {}).items())]
+    every = _told_apart(values, own.digits)
+    apart = [one for one in choices if one is own or len({one.value(v) for v in values}) == every]
+
+    def effort(one: Naming) -> tuple[int, bool, int]:
+        return _unreadable(one, entries), one is not own, sum(len(one.value(v)) for v in values)
+
+    return min(apart, key=effort)
+
+
+def _unreadable(naming: Naming, numbers: Sequence[float]) -> int:
+    """Return how many numbers, apart from 0, are too small or too large to read well."""
+    return sum(not LEAST_SHOWN <= abs(naming.shown(v)) < MOST_SHOWN for v in numbers if v)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _key_words(keys: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Return word and unit of each key: ``load.shaker.force_n`` -> ``force``, ``N``; equal words get the names of their tables."""
     split = {key: split_units(key.rpartition(".")[2]) for key in keys}
     words = {key: own.replace("_", " ") for key, (own, _) in split.items()}
@@ -58,15 +148,14 @@ def short_name(values: Values, names: Mapping[str, Naming]) -> str:
     names
         Result of `short_names`.
     """
-    return JOINT.join(
-        " ".join(filter(None, (own.word, written(values[key], own.digits), own.unit)))
-        for key, own in names.items()
-        if key in values
-    )
+    return JOINT.join(own.name(values[key]) for key, own in names.items() if key in values)
 
 
 def written(value: Any, digits: int = DIGITS) -> str:
-    """Return a varied value as text; numbers have `digits` digits."""
+    """Return a varied value as text; numbers have `digits` digits, a list of one number stands as the number."""
+    if isinstance(value, list):
+        each = " ".join(written(v, digits) for v in value)
+        return each if len(value) == 1 else f"[{each}]"
     return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
 
 

@@ -69,7 +69,7 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     words = short_names([rows for (names, _), rows in zip(kept, runs, strict=True) if names is None])
     told = [names or [short_name(row, words) for row in rows] for (names, _), rows in zip(kept, runs, strict=True)]
     found = [
-        VariedCase(JOINT.join(own), {k: v for part in parts for k, v in part.items()})
+        VariedCase(JOINT.join(filter(None, own)), {k: v for part in parts for k, v in part.items()})
         for own, parts in zip(product(*told), product(*runs), strict=True)
     ]
     doubled = [name for name, n in Counter(case.name for case in found).items() if n > 1]

@@ -54,7 +54,7 @@ from stickslip.report.quantities import (
     quantity,
 )
 from stickslip.report.section import Block, Card, Section
-from stickslip.study.varied import key_name
+from stickslip.study.varied import naming_of
 from stickslip.study.verdict import LEVELS
 
 _ALIKE = 0.01  # largest difference of equal peaks, relative to the largest peak
@@ -118,8 +118,7 @@ def _smallest_worst(response: Response, peaks: Mapping[ShownCase, float]) -> lis
     if not worst:
         return []
     least = min(worst, key=lambda c: peaks[c])
-    word, unit = key_name(response.data, key)
-    named = " ".join(filter(None, (word, number(least.value), unit)))
+    named = naming_of(response.data, key).name(least.value)
     level = f", {response.level(least)}" if response.trust(least) else ""
     size = f"{amplitude(peaks[least], response.unit)}{level}"
     over = percent(100 * (peaks[least] / min(peaks.values()) - 1.0))

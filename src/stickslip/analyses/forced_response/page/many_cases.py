@@ -9,10 +9,11 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.plot import COLOURS, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, number, scale_for
-from stickslip.study.varied import as_number, varied_values
+from stickslip.study.file.case_names import Naming
+from stickslip.study.varied import as_number, naming_of, varied_values
 
 FEW = 8  # largest number of cases in the legend of a panel
 MOST_PANELS = 12
@@ -124,8 +125,7 @@ def all_peaks(response: Response, key: str, curves: Mapping[str, Sequence[ShownC
     columns = sorted({case.value for case in cases})
     scale = scale_for(np.array([response.peak_response(c) for c in cases]), response.unit)
     if len(curves) <= MOST_ROWS and 2 * len(cases) >= len(curves) * len(columns):
-        figure = _map(response, curves, columns, scale)
-        figure.update_xaxes(title_text=axis_name(response.data, key))
+        figure = _map(response, curves, columns, scale, naming_of(response.data, key))
         return Plot("optimisation", "Peaks of all cases", f"{_ABOUT_MAP}{caption}", figure)
     return Plot("optimisation", "Peaks of all cases", f"{_ABOUT_AXES}{caption}", _parallel(response, cases, scale))
 
@@ -147,7 +147,11 @@ def _bar(scale: Scale, response: Response, drawn: FloatArray) -> dict[str, objec
 
 
 def _map(
-    response: Response, curves: Mapping[str, Sequence[ShownCase]], columns: Sequence[float], scale: Scale
+    response: Response,
+    curves: Mapping[str, Sequence[ShownCase]],
+    columns: Sequence[float],
+    scale: Scale,
+    naming: Naming,
 ) -> go.Figure:
     size = np.full((len(curves), len(columns)), np.nan)
     marks = np.full(size.shape, "", dtype=object)
@@ -162,10 +166,10 @@ def _map(
         [f"{number(float(v), 3)}{mark}" if np.isfinite(v) else "" for v, mark in zip(*row, strict=True)]
         for row in zip(size, marks, strict=True)
     ]
-    x, y = [number(float(v), 4) for v in columns], list(curves)
+    y = list(curves)
     figure = go.Figure(
         go.Heatmap(
-            x=x,
+            x=[number(naming.shown(v), 4) for v in columns],
             y=y,
             z=np.log10(size),
             text=texts,
@@ -182,7 +186,7 @@ def _map(
     corners = {"x0": column - 0.5, "x1": column + 0.5, "y0": row - 0.5, "y1": row + 0.5}
     figure.add_shape(type="rect", **corners, line={"color": COLOURS[1], "width": 2.4})
     styled(figure, _AROUND + _ROW_HEIGHT * len(y))
-    figure.update_xaxes(type="category", showgrid=False)
+    figure.update_xaxes(type="category", showgrid=False, title_text=naming.title)
     figure.update_yaxes(type="category", showgrid=False, autorange="reversed")
     return figure
 
@@ -191,7 +195,7 @@ def _parallel(response: Response, cases: Sequence[ShownCase], scale: Scale) -> g
     keys, values = varied_values(response.data)
     peak = np.array([response.peak_response(c) for c in cases]) * scale.factor
     own = values[[c.index for c in cases]]
-    axes = [_axis(axis_name(response.data, key), own[:, k]) for k, key in enumerate(keys) if len(set(own[:, k])) > 1]
+    axes = [_axis(naming_of(response.data, key), own[:, k]) for k, key in enumerate(keys) if len(set(own[:, k])) > 1]
     axes.append({"label": f"peak ({scale.unit})", "values": peak})
     axes.append({"label": "at (Hz)", "values": np.array([response.peak_hz(c) for c in cases])})
     line = {"color": np.log10(peak), "colorscale": _LINES, "showscale": True, "colorbar": _bar(scale, response, peak)}
@@ -200,11 +204,11 @@ def _parallel(response: Response, cases: Sequence[ShownCase], scale: Scale) -> g
     return figure
 
 
-def _axis(label: str, values: FloatArray) -> dict[str, object]:
-    """Return one of the parallel axes: numbers as they are, texts evenly spaced."""
+def _axis(naming: Naming, values: FloatArray) -> dict[str, object]:
+    """Return one of the parallel axes: numbers in the unit of the names, texts evenly spaced."""
     numbers = np.array([as_number(v) for v in values])
     if np.isfinite(numbers).all():
-        return {"label": label, "values": numbers}
+        return {"label": naming.title, "values": np.array([naming.shown(v) for v in numbers])}
     texts = list(dict.fromkeys(map(str, values)))
     at = np.array([texts.index(str(v)) for v in values])
-    return {"label": label, "values": at, "tickvals": list(range(len(texts))), "ticktext": texts}
+    return {"label": naming.title, "values": at, "tickvals": list(range(len(texts))), "ticktext": texts}

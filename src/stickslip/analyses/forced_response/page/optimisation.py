@@ -13,10 +13,12 @@ from stickslip.analyses.forced_response.page.tractions import draw_peak_bands
 from stickslip.analyses.forced_response.verdicts.working_range import MIN_PEAKS, TITLE, range_lines, working_ranges
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.model.readers.measured_columns import same
-from stickslip.report.cases import ShownCase, axis_name, families_of, first_number
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.content import Words
 from stickslip.report.plot import GRID, INK, MUTED, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
+from stickslip.study.file.case_names import Naming
+from stickslip.study.varied import naming_of
 
 SURE = {"standard deviation": 2.0, "half-width": 1.0}  # error bars within which computed and measured peaks agree
 WITHIN = {"standard deviation": "two standard deviations", "half-width": "the half-width"}
@@ -56,7 +58,7 @@ class Measured:
         found = np.concatenate([self.amplitude, self.amplitude + np.nan_to_num(self.amplitude_error)])
         return np.asarray(found[np.isfinite(found)])
 
-    def draw(self, figure: go.Figure, scale: Scale) -> None:
+    def draw(self, figure: go.Figure, scale: Scale, naming: Naming) -> None:
         """Draw the points with error bars into both panels, one symbol for each value of the other varied keys."""
         figure.update_layout(legend_groupclick="togglegroup")
         of_amplitude = (self.amplitude * scale.factor, self.amplitude_error * scale.factor)
@@ -67,6 +69,7 @@ class Measured:
                 for own in (at & np.isfinite(y) & barred, at & np.isfinite(y) & ~barred):
                     if own.any():
                         points = self._points(own, y, error, unit)
+                        points.x = [naming.shown(v) for v in self.values[own]]
                         label = ", ".join(filter(None, ["measured", name]))
                         told = any(t.legendgroup == f"measured{k}" for t in figure.data)
                         points.update(name=label, legendgroup=f"measured{k}", showlegend=not told)
@@ -77,7 +80,6 @@ class Measured:
         """Return a trace of points, either all with error bars or all without."""
         source = self.response.text("measured_source")
         points = go.Scatter(
-            x=self.values[own],
             y=y[own],
             mode="markers",
             text=[source] * int(own.sum()),
@@ -186,7 +188,7 @@ def what_is_needed(response: Response) -> Words | None:
     key, n = first_number(response.data)[0], len(response.cases)
     if not key or n >= MIN_PEAKS:
         return None
-    text = f"Curves over {axis_name(response.data, key)}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
+    text = f"Curves over {naming_of(response.data, key).title}, and where friction works, need {MIN_PEAKS} values or more; there are {n}. Add values to [vary]."
     return Words((text,))
 
 
@@ -196,11 +198,12 @@ def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: b
     stretches = ranges[0].stretches if len(ranges) == 1 and ranges[0].judged else []
     if not stretches:
         return ""
-    values = np.unique([p.value for p in ranges[0].peaks])
+    naming = ranges[0].naming
+    values = np.unique([naming.shown(p.value) for p in ranges[0].peaks])
     middles = np.sqrt(values[1:] * values[:-1]) if logarithmic else (values[1:] + values[:-1]) / 2
     edges = np.array([values[0], *middles, values[-1]])
     for stretch in stretches:
-        at = np.searchsorted(values, sorted(p.value for p in stretch))
+        at = np.searchsorted(values, sorted(naming.shown(p.value) for p in stretch))
         figure.add_vrect(
             x0=float(edges[at[0]]),
             x1=float(edges[at[-1] + 1]),
@@ -247,9 +250,9 @@ def optimisation(response: Response) -> Plot | None:
     if len(curves_of) > FEW:
         return all_peaks(response, key, curves_of, _optimum_caption(response, cases))
     peak = {c: response.peak_response(c) for c in cases}
-    scale = scale_for(np.array(list(peak.values())), response.unit)
+    scale, naming = scale_for(np.array(list(peak.values())), response.unit), naming_of(response.data, key)
     figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.62, 0.38])
-    banded = [draw_peak_bands(figure, response, own, scale.factor) for own in curves_of.values()]
+    banded = [draw_peak_bands(figure, response, own, scale.factor, naming) for own in curves_of.values()]
     colours = ramp(len(curves_of)) if len(curves_of) > 1 else [MUTED]
     for (name, family), line in zip(curves_of.items(), colours, strict=True):
         edge = {"width": 1, "color": "white"}
@@ -257,7 +260,7 @@ def optimisation(response: Response) -> Plot | None:
         curves = ((scale.unit, [peak[c] * scale.factor for c in family]), ("Hz", [response.peak_hz(c) for c in family]))
         for row, (unit, y) in enumerate(curves, 1):
             figure.add_scatter(
-                x=[c.value for c in family],
+                x=[naming.shown(c.value) for c in family],
                 y=y,
                 mode="lines+markers",
                 line={"color": line, "width": 1.3},
@@ -272,11 +275,11 @@ def optimisation(response: Response) -> Plot | None:
             )
     styled(figure, 480)
     if measured:
-        measured.draw(figure, scale)
-    values = np.unique([c.value for c in cases])
+        measured.draw(figure, scale, naming)
+    values = np.array([naming.shown(v) for v in np.unique([c.value for c in cases])])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
     ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
-    figure.update_xaxes(title_text=axis_name(response.data, key), row=2)
+    figure.update_xaxes(title_text=naming.title, row=2)
     figure.update_xaxes(type="log" if wide else "linear", **(ticks if len(values) < 15 else {}))
     drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
     figure.update_yaxes(title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), row=1)

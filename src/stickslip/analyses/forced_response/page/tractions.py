@@ -11,6 +11,7 @@ from stickslip.analyses.residual_tractions.page import has_width
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.quantities import percent
+from stickslip.study.file.case_names import Naming
 
 ANALYSIS = "residual_tractions"
 _TAKEN = ("frequency_hz", "least_amplitude", "most_amplitude", "resonance_hz", "resonance_amplitude", "harmonics")
@@ -82,7 +83,9 @@ def _harmonics(response: Response) -> int:
     return int(np.max(response.data[f"{_PREFIX}harmonics"].values))
 
 
-def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase], factor: float) -> str:
+def draw_peak_bands(
+    figure: go.Figure, response: Response, cases: list[ShownCase], factor: float, naming: Naming
+) -> str:
     """Draw the bounds of the peaks in the first column of an optimisation curve; return the sentence for the caption.
 
     Parameters
@@ -95,6 +98,8 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
         Cases of one curve by the value of the varied key.
     factor
         Factor from the unit of the response to the unit of the figure.
+    naming
+        Naming of the varied key.
     """
     if not _has(response):
         return ""
@@ -102,7 +107,7 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
     known = np.isfinite(bounds).all(axis=1)
     if not known.any():
         return ""
-    x = np.array([c.value for c in cases])[known]
+    x = np.array([naming.shown(c.value) for c in cases])[known]
     least, most = (bounds[known, k] * factor for k in (1, 2))
     if not has_width(least, most):
         return " Residual tractions leave the peaks as they are: the bounds are equal."

@@ -12,7 +12,8 @@ from stickslip.analyses.forced_response.records.columns import CaseNumbers, Peak
 from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
-from stickslip.study.varied import families, first_varied_number, key_name
+from stickslip.study.file.case_names import Naming
+from stickslip.study.varied import families, first_varied_number, naming_of
 from stickslip.study.verdict import LEVELS, said, together
 
 Regime = Literal["stuck", "stiffens", "works", "lets go"]
@@ -118,8 +119,8 @@ class WorkingRange:
     regimes
         One for each peak, none if the stuck end is unknown. ``stuck``: linear; ``stiffens``: less than 3 dB below the stuck peak;
         ``works``: more; ``lets go``: beyond the smallest peak, and 3 dB above it or less than 3 dB below the stuck one.
-    word, unit
-        Name and unit of the varied key: ``force``, ``N``.
+    naming
+        Word and unit of the varied key.
     others
         Name of the curve: the other varied keys with their values; empty for none.
     per_force
@@ -130,8 +131,7 @@ class WorkingRange:
 
     peaks: tuple[CurvePeak, ...]
     regimes: tuple[Regime, ...]
-    word: str = ""
-    unit: str = ""
+    naming: Naming = Naming("", "")  # noqa: RUF009  # frozen
     others: str = ""
     per_force: bool = True
     left_out: tuple[str, ...] = ()
@@ -254,14 +254,14 @@ def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
     force = [own.excitation_n for own in of_cases(CaseNumbers, data)]
     per_force = all(own > 0 for own in force)
     labels = [str(x) for x in data["case_label"].values]
-    word, unit = key_name(data, key)
+    naming = naming_of(data, key)
     found = []
     for others, cases in families(data, key).items():
         known = {c: _peak(data, c, float(values[c]), force[c], per_force=per_force) for c in cases}
         own = working_range([p for p in known.values() if p is not None], key)
         if own is not None:
             out = tuple(labels[c] for c, p in known.items() if p is None)
-            found.append(replace(own, word=word, unit=unit, others=others, per_force=per_force, left_out=out))
+            found.append(replace(own, naming=naming, others=others, per_force=per_force, left_out=out))
     return tuple(found)
 
 
@@ -323,10 +323,10 @@ def range_lines(data: xr.Dataset) -> tuple[str, ...]:
 def range_line(own: WorkingRange) -> str:
     """State the working range of a curve in one line: where it works, the smallest peak, and where contacts stick and let go."""
     if not own.judged:
-        return f"cannot be told from these values of {own.word}"
+        return f"cannot be told from these values of {own.naming.word}"
     works = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
     by = "within 3 dB of the smallest peak" if own.stuck is None else "3 dB below the stuck system's peak"
-    told = [f"friction works {works} ({by})" if works else f"friction works at no {own.word}"]
+    told = [f"friction works {works} ({by})" if works else f"friction works at no {own.naming.word}"]
     told.append(f"the {_size(own)} is smallest at {_value(own, own.smallest)}")
     if own.stuck is not None:
         told.append(f"all contacts stick {'from' if own.falling else 'up to'} {_value(own, own.stuck)}")
@@ -348,15 +348,15 @@ def range_sentences(own: WorkingRange) -> tuple[str, ...]:
 
 
 def _unknown(own: WorkingRange) -> str:
-    return f"Where friction works cannot be told from these values of {own.word}: all contacts stick at neither end, and their states do not show which end is nearer to full stick. Add values beyond both ends."
+    return f"Where friction works cannot be told from these values of {own.naming.word}: all contacts stick at neither end, and their states do not show which end is nearer to full stick. Add values beyond both ends."
 
 
 def _of(own: WorkingRange, peak: CurvePeak) -> str:
-    return f"{own.word} {_value(own, peak)}".strip()
+    return own.naming.name(peak.value).strip()
 
 
 def _value(own: WorkingRange, peak: CurvePeak) -> str:
-    return f"{peak.value:g} {own.unit}".strip()
+    return own.naming.value(peak.value)
 
 
 def _size(own: WorkingRange) -> str:
