@@ -32,7 +32,7 @@ from .errors import InputError as InputError
 from .errors import SingularError as SingularError
 from .errors import StickslipError as StickslipError
 from .harmonic.excitation import HarmonicLoad as HarmonicLoad
-from .model.fe.solid import Material as Material
+from .model.fe.material import Material as Material
 from .model.mesh.blade_pair import BladePair as BladePair
 from .model.mesh.sector import BladedSector as BladedSector
 from .model.part import Part as Part

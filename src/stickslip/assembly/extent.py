@@ -1,5 +1,6 @@
 """Size and stiffness of the bodies of a model, the scales of its motions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,6 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.assembly.response_request import asked
 from stickslip.model.facts import facts_of_part
-from stickslip.model.fe.solid import Material
 from stickslip.model.part import Part
 
 
@@ -43,7 +43,7 @@ def _stiff_volume(part: Part) -> float:
     if solid is None:
         return float("nan")
     own = solid.material
-    every = [own] if isinstance(own, Material) else list(own)
+    every = list(own) if isinstance(own, Sequence) else [own]
     volume = facts_of_part(part).mass / min(m.density for m in every)
     return float(volume * max(m.young_modulus for m in every))
 

@@ -9,6 +9,7 @@ import scipy
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
+from stickslip.model.fe.material import moved_materials
 from stickslip.model.fe.rotation import RotatingSolid, with_inner_inertia
 from stickslip.model.mesh.solid_mesh import SolidMesh, mirrored_cells
 from stickslip.model.part import BodyPoints, Part, Place, rigid_part
@@ -153,14 +154,15 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
     mesh = moved_mesh(solid.mesh, place)
     arm = solid.axis.arm(mesh.points)
     load: FloatArray = solid.nodal_mass @ arm
+    material = moved_materials(solid.material, place.turn, place.move)
     inner = with_inner_inertia(
-        scipy.sparse.csr_array((arm.size, arm.size)), mesh, solid.material, solid.quadrature, np.eye(3)
+        scipy.sparse.csr_array((arm.size, arm.size)), mesh, material, solid.quadrature, np.eye(3)
     )
     load = load.ravel() + inner @ arm.ravel() if inner.nnz else load.ravel()
     return RotatingSolid(
         structure,
         mesh,
-        solid.material,
+        material,
         solid.axis,
         solid.quadrature,
         solid.moving,

@@ -11,6 +11,11 @@ from .fe.beam import Beam as Beam
 from .fe.beam import beam as beam
 from .fe.beam import rotating_beam as rotating_beam
 from .fe.elements import Quadrature as Quadrature
+from .fe.material import ByTemperature as ByTemperature
+from .fe.material import ElasticMaterial as ElasticMaterial
+from .fe.material import Orientation as Orientation
+from .fe.material import elastic_material as elastic_material
+from .fe.material import orthotropic_stiffness as orthotropic_stiffness
 from .fe.rotation import RotatingSolid as RotatingSolid
 from .fe.rotation import SpeedPolynomial as SpeedPolynomial
 from .fe.rotation import rotating_solid as rotating_solid

@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.solid import Material
+from stickslip.model.fe.material import ORDERS, AnyMaterial, ElasticMaterial, Material, stress_rotation
 from stickslip.model.mesh.solid_mesh import SolidMesh, by_kind
 
 ELEMENT_TYPES = {4: "C3D4", 6: "C3D6", 8: "C3D8", 10: "C3D10", 15: "C3D15", 20: "C3D20"}
@@ -53,7 +53,7 @@ class CalculixRun:
 
 def write_deck(
     mesh: SolidMesh,
-    material: Material,
+    material: AnyMaterial,
     path: Path,
     *,
     clamped: Sequence[str] = ("root",),
@@ -84,7 +84,7 @@ def write_deck(
     Raises
     ------
     InputError
-        If a set is missing, the mesh has pyramids, or nodal diameters are requested for a structure that is not cyclic.
+        If a set is missing, the material depends on temperature, the mesh has pyramids, or nodal diameters are requested for a structure that is not cyclic.
     """
     axis, run = axis or Axis(), run or CalculixRun()
     if not {width for width, _ in by_kind(mesh.cells)} <= ELEMENT_TYPES.keys():
@@ -92,6 +92,8 @@ def write_deck(
             "write_deck", "the mesh has pyramids, which CalculiX does not have", "Divide them into tetrahedra."
         )
     wanted = [*clamped, *(("cyclic_low", "cyclic_high") if sectors else ())]
+    if isinstance(material, ElasticMaterial) and material.varies:
+        raise input_error("write_deck", "the material depends on temperature", "Take it at one temperature.")
     missing = [name for name in wanted if name not in mesh.node_sets]
     if missing:
         raise input_error("write_deck", f"the mesh lacks the node sets {missing}", f"It has {[*mesh.node_sets]}.")
@@ -138,15 +140,23 @@ def _mesh_cards(mesh: SolidMesh) -> Iterator[str]:
         yield from _rows(numbers[nodes])
 
 
-def _material_cards(material: Material) -> list[str]:
-    return [
-        "*MATERIAL, NAME=MATERIAL",
-        "*ELASTIC",
-        f"{material.young_modulus:.13e}, {material.poisson_ratio:.13e}",
-        "*DENSITY",
-        f"{material.density:.13e}",
-        "*SOLID SECTION, ELSET=EALL, MATERIAL=MATERIAL",
-    ]
+def _material_cards(material: AnyMaterial) -> list[str]:
+    section, orientation = "*SOLID SECTION, ELSET=EALL, MATERIAL=MATERIAL", []
+    if isinstance(material, Material):
+        elastic = ["*ELASTIC", f"{material.young_modulus:.13e}, {material.poisson_ratio:.13e}"]
+    else:
+        own = material.orientation
+        # the matrix in the axes of the cylinder or in global axes: no further turn has to be written
+        turn = stress_rotation(np.asarray(own.axes, dtype=float))
+        matrix = (turn @ material.matrices(None) @ turn.T)[np.ix_(ORDERS["12-13-23"], ORDERS["12-13-23"])]
+        values = [f"{matrix[i, j]:.13e}" for j in range(6) for i in range(j + 1)]
+        elastic = ["*ELASTIC, TYPE=ANISO", *(", ".join(values[i : i + 8]) for i in (0, 8, 16))]
+        if own.around is not None:
+            ends = [*own.around.origin, *(np.asarray(own.around.origin) + own.around.unit)]
+            orientation = ["*ORIENTATION, NAME=AXES, SYSTEM=CYLINDRICAL", ", ".join(f"{v:.13e}" for v in ends)]
+            section += ", ORIENTATION=AXES"
+    cards = ["*MATERIAL, NAME=MATERIAL", *elastic, "*DENSITY", f"{material.density:.13e}"]
+    return [*cards, *orientation, section]
 
 
 def _cyclic_cards(sectors: int, axis: Axis) -> list[str]:

@@ -1,13 +1,14 @@
 """Mass, centre of mass, size and counts of a model."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.elements import Quadrature, cell_groups, chunks, gradients
-from stickslip.model.fe.solid import Material, Materials, densities
+from stickslip.model.fe.material import Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
@@ -128,7 +129,7 @@ def _of_material(name: str) -> Callable[[Part], float]:
         if part.solid is None:
             return 0.0
         material = part.solid.material
-        return float(getattr(material if isinstance(material, Material) else material[0], name))
+        return float(getattr(material[0] if isinstance(material, Sequence) else material, name))
 
     return number
 
@@ -142,7 +143,7 @@ _MEASURES: tuple[tuple[str, str, Callable[[Part], float]], ...] = (
 
 def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
     """Return the facts of a mesh with `dofs` free dofs; clamped nodes count."""
-    density = densities(mesh, material)
+    density = cell_laws(mesh, material).density(slice(0, len(mesh.cells)))
     mass, moment = 0.0, np.zeros(3)
     for group in cell_groups(mesh, Quadrature(DEGREE, DEGREE)):
         shape, own = group.strain, group.mesh

@@ -11,8 +11,8 @@ from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.fe.elements import EXACT, Rules
+from stickslip.model.fe.material import Materials
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
-from stickslip.model.fe.solid import Materials
 from stickslip.model.matrices_at_speeds import SpeedMatrices
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.rigid.body import RigidBody

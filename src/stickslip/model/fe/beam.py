@@ -17,7 +17,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.fe.solid import Material
+from stickslip.model.fe.material import Material
 from stickslip.model.structure import Dofs, Structure, join_dofs
 from stickslip.units import check_quantities, length, quantity
 

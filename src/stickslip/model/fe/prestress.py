@@ -8,12 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.model.fe.cell_matrices import cell_stiffness, condensed, inner_motion, store_blocks, with_inner_modes
+from stickslip.model.fe.cell_laws import cell_laws
+from stickslip.model.fe.cell_matrices import (
+    cell_stiffness,
+    condensed,
+    inner_motion,
+    store_blocks,
+    strain_operator,
+    with_inner_modes,
+)
 from stickslip.model.fe.elements import EXACT, NodeBlocks, Shape, cell_groups, chunks, gradients, shape_functions
-from stickslip.model.fe.solid import Materials, lame_constants
+from stickslip.model.fe.material import PAIRS, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
-PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]  # rows of a strain vector, shears doubled
+TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # places of a tensor's components in a vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +63,20 @@ def prestress_terms(
     green
         True: stress of the Green strain; False: stress of the small strain, linear in the displacement.
     """
-    lame = lame_constants(mesh, material)
+    laws = cell_laws(mesh, material)
     stores = [places.zeros(9), places.zeros(9), places.zeros(9 if shape.inner else 1)]
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
-        motion = _inner(shape, lame[piece], slopes, volume)
+        law = laws.elastic(shape, piece)
+        motion = _inner(shape, law, slopes, volume)
         turn = displacement_gradients(mesh, slopes, piece, displacement, motion)
-        small = _strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
-        large = _strain_operator(turn, slopes)
+        small = strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
+        large = strain_operator(turn, slopes)
         m, q, k, _ = slopes.shape
-        stressed = (volume[:, :, None, None] * (_elasticity(lame[piece]) @ large)).reshape(m, 6 * q, 3 * k)
+        stressed = (volume[:, :, None, None] * (_elasticity(law) @ large)).reshape(m, 6 * q, 3 * k)
         mixed = small.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         square = large.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
-        stress = volume[:, :, None, None] * second_stress(lame[piece], turn, green)
+        stress = volume[:, :, None, None] * second_stress(law, turn, green)
         pulled = np.matmul(slopes, stress).transpose(0, 2, 1, 3).reshape(m, k, 3 * q)
         geometric = pulled @ slopes.transpose(0, 1, 3, 2).reshape(m, 3 * q, k)
         store_blocks(places, stores[0], piece, condensed(mixed + mixed.transpose(0, 2, 1), motion))
@@ -81,12 +90,13 @@ def prestress_terms(
 
 def internal_force(mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray) -> FloatArray:
     """Return the (nodes, 3) forces in N that keep the solid in equilibrium at a finite displacement (nodes, 3)."""
-    force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
+    force, laws = np.zeros_like(mesh.points), cell_laws(mesh, material)
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
-        motion = _inner(shape, lame[piece], slopes, volume)
+        law = laws.elastic(shape, piece)
+        motion = _inner(shape, law, slopes, volume)
         turn = displacement_gradients(mesh, slopes, piece, displacement, motion)
-        first = (np.eye(3) + turn) @ second_stress(lame[piece], turn, green=True)
+        first = (np.eye(3) + turn) @ second_stress(law, turn, green=True)
         pull = np.einsum("mqac,mqkc,mq->mka", first, slopes, volume, optimize=True)
         if motion is not None:
             onto = motion.transpose(0, 2, 1) @ pull[:, shape.width :].reshape(len(pull), -1, 1)
@@ -97,9 +107,9 @@ def internal_force(mesh: SolidMesh, material: Materials, shape: Shape, displacem
     return force
 
 
-def _inner(shape: Shape, lame: FloatArray, slopes: FloatArray, volume: FloatArray) -> FloatArray | None:
+def _inner(shape: Shape, law: FloatArray, slopes: FloatArray, volume: FloatArray) -> FloatArray | None:
     """Return the `inner_motion` of bricks with incompatible modes; None of other cells."""
-    return inner_motion(shape, cell_stiffness(lame, slopes, volume)) if shape.inner else None
+    return inner_motion(shape, cell_stiffness(law, slopes, volume)) if shape.inner else None
 
 
 def displacement_gradients(
@@ -113,34 +123,32 @@ def displacement_gradients(
     return np.asarray(moved[:, None] @ slopes)
 
 
-def second_stress(lame: FloatArray, turn: FloatArray, green: bool) -> FloatArray:
+def second_stress(law: FloatArray, turn: FloatArray, green: bool) -> FloatArray:
     """Return the (m, q, 3, 3) stress in Pa of displacement gradients, from their Green or small strain.
 
-    `lame` holds Lamé's constants (m, 2).
+    `law` is that of `CellLaws.elastic`.
     """
     strain = (turn + np.swapaxes(turn, -1, -2)) / 2
     if green:
         strain = strain + np.swapaxes(turn, -1, -2) @ turn / 2
-    first, second = lame.T[:, :, None, None, None]
+    if law.ndim > 2:
+        vector = np.stack([strain[..., i, j] * (1 if i == j else 2) for i, j in PAIRS], axis=-1)
+        stress = (law @ vector[..., None])[..., 0]
+        return np.asarray(stress[..., TENSOR])
+    first, second = law.T[:, :, None, None, None]
     trace = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
     return np.asarray(first * trace * np.eye(3) + 2 * second * strain)
 
 
-def _strain_operator(turn: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Return (m, q, 6, 3k): ``sym(turnᵀ ∇v)`` of the k nodes' displacements v, shears doubled."""
-    product = np.einsum("mqac,mqkd->mqcdka", turn, slopes)
-    rows = [product[:, :, c, d] if c == d else product[:, :, c, d] + product[:, :, d, c] for c, d in PAIRS]
-    stacked = np.stack(rows, axis=2)
-    return stacked.reshape(*stacked.shape[:3], -1)
-
-
-def _elasticity(lame: FloatArray) -> FloatArray:
-    """Return (m, 1, 6, 6) matrices from strain vectors to stress vectors."""
-    first, second = lame.T[:, :, None, None]
+def _elasticity(law: FloatArray) -> FloatArray:
+    """Return (m, 1 or q, 6, 6) matrices from strain vectors to stress vectors."""
+    if law.ndim > 2:
+        return law
+    first, second = law.T[:, :, None, None]
     volume = np.zeros((6, 6))
     volume[:3, :3] = 1.0
-    law = first * volume + second * np.diag([2.0] * 3 + [1.0] * 3)
-    return np.asarray(law[:, None])
+    found = first * volume + second * np.diag([2.0] * 3 + [1.0] * 3)
+    return np.asarray(found[:, None])
 
 
 def strain_and_rotation(mesh: SolidMesh, displacement: FloatArray) -> tuple[float, float]:

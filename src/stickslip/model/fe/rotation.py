@@ -16,11 +16,13 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
 from stickslip.model.axis import Axis
+from stickslip.model.fe.cell_laws import cell_laws, laws_of_group
 from stickslip.model.fe.cell_matrices import hourglass_stiffness, inertia
 from stickslip.model.fe.elements import EXACT, CellGroup, NodeBlocks, Rules, cell_groups
 from stickslip.model.fe.factorisation import factorise
+from stickslip.model.fe.material import Materials
 from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms
-from stickslip.model.fe.solid import Materials, densities, integrate, lame_constants, node_dofs, support
+from stickslip.model.fe.solid import integrate, node_dofs, support
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 
@@ -108,8 +110,9 @@ class RotatingSolid:
         groups = [group for group in self.cell_groups if group.rule.hourglass is not None]
         if not groups:
             return None
-        lame = lame_constants(self.mesh, self.material)
-        return self._of_dofs(sum(hourglass_stiffness(group, lame[group.rows]) for group in groups))
+        laws = cell_laws(self.mesh, self.material)
+        parts = (hourglass_stiffness(group, laws_of_group(laws, group.mesh, group.rows)) for group in groups)
+        return self._of_dofs(sum(parts))
 
     @property
     def free(self) -> BoolArray:
@@ -348,8 +351,8 @@ def with_inner_inertia(
     groups = [group for group in cell_groups(mesh, quadrature) if group.rule.inner]
     if not groups:
         return matrix
-    lame, density = lame_constants(mesh, material), densities(mesh, material)
-    return matrix + sum(inertia(group, lame[group.rows], density[group.rows], block) for group in groups)
+    laws = cell_laws(mesh, material)
+    return matrix + sum(inertia(group, laws_of_group(laws, group.mesh, group.rows), block) for group in groups)
 
 
 def _content(tie: Matrix | None) -> str:

@@ -3,8 +3,7 @@
 scikit-fem is imported only when a solid is assembled.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.cell_matrices import assemble_cells, is_plain
 from stickslip.model.fe.elements import (
     EXACT,
@@ -23,42 +23,11 @@ from stickslip.model.fe.elements import (
     library,
     library_element,
 )
+from stickslip.model.fe.material import AnyMaterial, Material, Materials
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.structure import Structure, nodal_dofs
-from stickslip.units import check_quantities, quantity
 
 CUT_FACES = ("cyclic_low", "cyclic_high")  # sets whose clamped nodes are removed; other sets must have none
-
-
-@dataclass(frozen=True, kw_only=True)
-class Material:
-    """An isotropic elastic material.
-
-    Parameters
-    ----------
-    young_modulus
-        Young's modulus in Pa.
-    poisson_ratio
-        Poisson's ratio, from 0 to below 1/2.
-    density
-        Density in kg/m³.
-    """
-
-    young_modulus: float = quantity("Young's modulus (steel: 2.1e11)", "pa", default=210e9, above=0)
-    poisson_ratio: float = quantity("Poisson's ratio (steel: 0.3)", default=0.3, least=0, below=0.5)
-    density: float = quantity("density (steel: 7850)", "kg_per_m3", default=7850.0, above=0)
-
-    def __post_init__(self) -> None:
-        check_quantities(self)
-
-    @property
-    def lame(self) -> tuple[float, float]:
-        """Lamé's constants λ and G in Pa."""
-        e, nu = self.young_modulus, self.poisson_ratio
-        return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
-
-
-Materials = Material | Sequence[Material]  # one for all cells, or one for each
 
 
 def assemble_solid(
@@ -163,17 +132,14 @@ def integrate(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[
         for degree in {group.rule.stiffness: group.strain, group.rule.mass: group.inertia}.values():
             check_jacobians(group.mesh, degree)
     check_shared(mesh)
-    if isinstance(material, Material) and len(groups) == 1:
-        return _integrate(groups[0], material)
+    laws = cell_laws(mesh, material)
+    if len(laws.each) == 1 and len(groups) == 1:
+        return _integrate(groups[0], laws.each[0])
     n = 3 * len(mesh.points)
     mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
-    known = [material] if isinstance(material, Material) else list(dict.fromkeys(material))
-    which = np.zeros(len(mesh.cells), dtype=np.int64)
-    if not isinstance(material, Material):
-        which = np.array([known.index(m) for m in _of_cells(mesh, material)])
-    for index, one in enumerate(known):
+    for index, one in enumerate(laws.each):
         for group in groups:
-            cells = group.mesh.cells[which[group.rows] == index]
+            cells = group.mesh.cells[laws.which[group.rows] == index]
             if not len(cells):
                 continue
             nodes, local = np.unique(cells, return_inverse=True)
@@ -185,39 +151,15 @@ def integrate(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[
     return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
 
 
-def densities(mesh: SolidMesh, material: Materials) -> FloatArray:
-    """Return the density of each cell, (m,), in kg/m³."""
-    if isinstance(material, Material):
-        return np.full(len(mesh.cells), material.density)
-    return np.array([one.density for one in _of_cells(mesh, material)])
-
-
-def lame_constants(mesh: SolidMesh, material: Materials) -> FloatArray:
-    """Return Lamé's constants λ and G of each cell, (m, 2), in Pa."""
-    if isinstance(material, Material):
-        return np.tile(material.lame, (len(mesh.cells), 1))
-    return np.array([one.lame for one in _of_cells(mesh, material)])
-
-
-def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Material]:
-    if len(material) != len(mesh.cells):
-        raise input_error(
-            "material",
-            f"is a list of {len(material)} for {len(mesh.cells)} cells",
-            "Give one material, or one for each cell.",
-        )
-    return material
-
-
-def _integrate(group: CellGroup, material: Material) -> tuple[Matrix, Matrix]:
+def _integrate(group: CellGroup, material: AnyMaterial) -> tuple[Matrix, Matrix]:
     """Integrate a body of one material.
 
     Both matrices are built from scalar integrals, ``∫ φ_p φ_q`` and ``D_ab = ∫ ∂_a φ_p ∂_b φ_q``:
     ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. This costs a fraction of the vector-valued form.
     """
     mesh, quadrature = group.mesh, group.rule
-    if not is_plain(group):
-        return assemble_cells(group, lame_constants(mesh, material), densities(mesh, material))
+    if not (is_plain(group) and isinstance(material, Material)):
+        return assemble_cells(group, cell_laws(mesh, material))
     bases, theirs = _bases(mesh, quadrature)
 
     def assemble(integrand: Callable[..., FloatArray], degree: int) -> Matrix:

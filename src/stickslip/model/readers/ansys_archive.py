@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, input_error
-from stickslip.model.fe.solid import Material
+from stickslip.model.fe.material import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
     BEHAVIOUR,

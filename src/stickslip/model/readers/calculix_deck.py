@@ -16,7 +16,8 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.elements import EXACT, Quadrature, Rules
-from stickslip.model.fe.solid import Material, integrate, node_dofs
+from stickslip.model.fe.material import Material
+from stickslip.model.fe.solid import integrate, node_dofs
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, keyword_blocks, real_number, unique_in_order, whole_number

@@ -14,7 +14,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.hourglass import hourglass_doubts
-from stickslip.model.fe.solid import Material, Materials
+from stickslip.model.fe.material import Material, Materials
 from stickslip.model.matrices_at_speeds import AtSpeed, SpeedMatrices, speed_matrices, warnings_of
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part

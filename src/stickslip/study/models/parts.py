@@ -16,7 +16,7 @@ from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
-from stickslip.model.fe.solid import Material
+from stickslip.model.fe.material import Material
 from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.sector import BladedSector

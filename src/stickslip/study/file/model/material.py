@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
 
 from stickslip.model.damping import Damping
-from stickslip.model.fe.solid import Material
+from stickslip.model.fe.material import Material
 from stickslip.model.readers.units import MODULI, SOLIDS
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
