@@ -1,21 +1,30 @@
-"""A sector of a ring or a plain disk, as a regular grid of second-order hexahedra; no mesher is needed."""
+"""A sector of a ring or a plain disk, as a regular grid of second-order cells; no mesher is needed."""
 
 import math
 
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import EDGES, SolidMesh
 
-# grid steps (radius, angle, axis) of a 20-node hexahedron's nodes within its 2 x 2 x 2 cell, VTK order
-CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
-MIDDLES = [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
-UPRIGHT = [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
-HEX20 = np.array([*CORNERS, *MIDDLES, *UPRIGHT])
+# grid steps (radius, angle, axis) of a hexahedron's corners within its 2 x 2 x 2 cell, VTK order
+CORNERS = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)])
+# corners of the cells that fill it, by their number of nodes: the hexahedron, two wedges, six tetrahedra
+FILLED = {
+    20: [[0, 1, 2, 3, 4, 5, 6, 7]],
+    15: [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
+    10: [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+}
 
 
 def annular_sector(
-    inner_radius: float, outer_radius: float, width: float, *, sectors: int, divisions: tuple[int, int, int] = (4, 2, 1)
+    inner_radius: float,
+    outer_radius: float,
+    width: float,
+    *,
+    sectors: int,
+    divisions: tuple[int, int, int] = (4, 2, 1),
+    cell: int = 20,
 ) -> SolidMesh:
     """Mesh one of `sectors` equal sectors of a ring of rectangular cross-section.
 
@@ -30,7 +39,9 @@ def annular_sector(
     sectors
         How many make the ring, at least 2.
     divisions
-        Elements along the radius, around the sector, and along the axis.
+        Bricks along the radius, around the sector, and along the axis.
+    cell
+        Nodes of a cell: 20 for bricks, 15 for wedges, 10 for tetrahedra.
 
     Returns
     -------
@@ -47,9 +58,12 @@ def annular_sector(
     place = np.stack(np.meshgrid(*(np.arange(n) for n in steps), indexing="ij"), axis=-1)
     place = place.reshape(-1, 3)
     first = np.stack(np.meshgrid(*(np.arange(0, n - 1, 2) for n in steps), indexing="ij"), axis=-1)
-    cells = np.ravel_multi_index(tuple((first.reshape(-1, 1, 3) + HEX20).transpose(2, 0, 1)), tuple(steps))
-    # nodes with at most one odd step lie on edges: the others belong to no serendipity element
-    used = np.flatnonzero((place % 2).sum(axis=1) <= 1)
+    corners = CORNERS[FILLED[cell]]
+    ends = np.array(EDGES[corners.shape[1]])
+    shapes = np.concatenate([corners, (corners[:, ends[:, 0]] + corners[:, ends[:, 1]]) // 2], axis=1)
+    at = (first.reshape(-1, 1, 1, 3) + shapes).reshape(-1, cell, 3)
+    cells = np.ravel_multi_index(tuple(at.transpose(2, 0, 1)), tuple(steps))
+    used = np.unique(cells)  # the middle of a face belongs to a cell only if the face is divided
     place = place[used]
 
     def where(column: int, step: int) -> IntArray:

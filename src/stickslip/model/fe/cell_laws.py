@@ -84,7 +84,9 @@ def cell_laws(mesh: SolidMesh, material: Materials) -> CellLaws:
     """
     each = material if isinstance(material, Sequence) else [material]
     if any(isinstance(one, ElasticMaterial) and one.varies for one in each):
-        raise input_error("material", "depends on temperature, and none is given", "Give a material of one temperature.")
+        raise input_error(
+            "material", "depends on temperature, and none is given", "Give a material of one temperature."
+        )
     if not isinstance(material, Sequence):
         return CellLaws(mesh, (material,), np.zeros(len(mesh.cells), dtype=np.int64))
     if len(material) != len(mesh.cells):

@@ -49,6 +49,11 @@ class Material:
         row = np.array([self.young_modulus, self.poisson_ratio])
         return _matrix(np.broadcast_to(row, (*shape, 2)))
 
+    @property
+    def in_words(self) -> str:
+        """Constants, for a line about the material."""
+        return f"E {self.young_modulus:.4g} Pa, ν {self.poisson_ratio:g}, ρ {self.density:.4g} kg/m³"
+
 
 @dataclass(frozen=True)
 class Orientation:
@@ -214,7 +219,17 @@ class ElasticMaterial:
     @property
     def young_modulus(self) -> float:
         """Largest Young's modulus along one of the three axes in Pa, at the lowest temperature of its table."""
-        return float(1 / np.diag(np.linalg.inv(self.matrices(None)))[:3].min())
+        return max(self._young_moduli)
+
+    @property
+    def _young_moduli(self) -> list[float]:
+        return [float(1 / value) for value in np.diag(np.linalg.inv(self.matrices(None)))[:3]]
+
+    @property
+    def in_words(self) -> str:
+        """Moduli along the axes and density, for a line about the material."""
+        moduli = ", ".join(f"{value:.4g}" for value in self._young_moduli)
+        return f"E {moduli} Pa along its axes, ρ {self.density:.4g} kg/m³"
 
     @property
     def is_isotropic(self) -> bool:

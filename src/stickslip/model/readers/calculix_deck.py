@@ -16,9 +16,10 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.elements import EXACT, Quadrature, Rules
-from stickslip.model.fe.material import Material
+from stickslip.model.fe.material import AnyMaterial
 from stickslip.model.fe.solid import integrate, node_dofs
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
+from stickslip.model.readers.deck_materials import material_of, read_orientation
 from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, keyword_blocks, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import block_nodes
@@ -136,7 +137,7 @@ class Deck:
     cell_types
         (m,) element type of each cell in the deck's words, e.g. ``C3D10``.
     materials
-        Name -> material.
+        Name -> material; a material in an orientation has the name ``MATERIAL in ORIENTATION``.
     cell_material
         (m,) material name of each cell.
     held
@@ -157,7 +158,7 @@ class Deck:
 
     mesh: SolidMesh
     cell_types: tuple[str, ...]
-    materials: Mapping[str, Material]
+    materials: Mapping[str, AnyMaterial]
     cell_material: tuple[str, ...]
     held: BoolArray
     speed: float | None
@@ -173,7 +174,7 @@ class Deck:
         return ", ".join(dict.fromkeys(self.cell_types))
 
     @property
-    def material(self) -> Material:
+    def material(self) -> AnyMaterial:
         """The only material; an `InputError` if there are several."""
         used = sorted(set(self.cell_material))
         if len(used) != 1:
@@ -321,22 +322,31 @@ def assemble_deck(deck: Deck) -> Structure:
     )
 
 
-def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Material]:
+def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, AnyMaterial]:
     """Return the materials of the sections."""
     materials = {}
-    for name, _, place in model.sections:
+    for name, axes, _, place in model.sections:
         for what, table in (("*ELASTIC", model.elastic), ("*DENSITY", model.density)):
             if name not in table:
                 raise input_error(place, f"material {name!r} has no {what}", _found_instead(model, name))
-        modulus, ratio = model.elastic[name]
-        modulus, density = units.stress * modulus, units.density * model.density[name]
-        if plausible:
-            check_material(density, modulus, units, place)
+        orientation = None
+        if axes:
+            if axes not in model.orientations:
+                raise unknown(place, "orientation", axes, list(model.orientations))
+            orientation = read_orientation(model.orientations[axes], units)
         try:
-            materials[name] = Material(young_modulus=modulus, poisson_ratio=ratio, density=density)
+            materials[_in_axes(name, axes)] = material_of(model.elastic[name], model.density[name], orientation, units)
         except InputError as error:
             raise error.inside(f"{place}: material {name!r}") from None
+        own = materials[_in_axes(name, axes)]
+        if plausible:
+            check_material(own.density, own.young_modulus, units, place)
     return materials
+
+
+def _in_axes(material: str, orientation: str) -> str:
+    """Return the name of a material in an orientation."""
+    return f"{material} in {orientation}" if orientation else material
 
 
 def _found_instead(model: DeckModel, name: str) -> str:
@@ -351,7 +361,7 @@ def _cell_materials(model: DeckModel) -> tuple[str, ...]:
     """Return the material of each cell; if two sections contain a cell, the last one counts."""
     numbers = model.cells[:, 0]
     name = np.full(len(numbers), -1)
-    for i, (_, elements, _) in enumerate(model.sections):
+    for i, (_, _, elements, _) in enumerate(model.sections):
         name[np.isin(numbers, model.element_sets[elements])] = i
     if (name < 0).any():
         raise input_error(
@@ -359,7 +369,8 @@ def _cell_materials(model: DeckModel) -> tuple[str, ...]:
             f"{(name < 0).sum()} elements have no material, e.g. {numbers[name < 0][0]}",
             "Name an element set that holds them in a *SOLID SECTION.",
         )
-    return tuple(model.sections[i][0] for i in name)
+    names = [_in_axes(material, axes) for material, axes, _, _ in model.sections]
+    return tuple(names[i] for i in name)
 
 
 def _mesh(model: DeckModel, units: Units) -> tuple[SolidMesh, IntArray]:

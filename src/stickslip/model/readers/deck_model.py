@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.readers.deck_materials import Constants, read_constants
 from stickslip.model.readers.deck_words import (
     DAMPING,
     PARAMETERS,
@@ -46,9 +47,10 @@ class DeckModel:
     kinds: tuple[str, ...] = ()
     cells: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     element_sets: dict[str, IntArray] = field(default_factory=dict)
-    elastic: dict[str, tuple[float, float]] = field(default_factory=dict)
-    density: dict[str, float] = field(default_factory=dict)
-    sections: list[tuple[str, str, str]] = field(default_factory=list)  # material, set, place
+    elastic: dict[str, Constants] = field(default_factory=dict)
+    density: dict[str, Constants] = field(default_factory=dict)
+    orientations: dict[str, Block] = field(default_factory=dict)
+    sections: list[tuple[str, str, str, str]] = field(default_factory=list)  # material, orientation or "", set, place
     fixed: dict[str, list[IntArray]] = field(default_factory=lambda: {"x": [], "y": [], "z": []})
     speed_squares: list[float] = field(default_factory=list)
     axes: list[tuple[str, list[float], list[float]]] = field(default_factory=list)  # place, origin, direction
@@ -202,30 +204,19 @@ def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
 def _material(model: DeckModel, block: Block, material: str) -> None:
     if not material:
         raise input_error(block.place, "belongs to no *MATERIAL", "Put it below its material.")
-    kind = block.parameters.get("TYPE", "ISO").upper()
-    if block.keyword == "ELASTIC" and not kind.startswith("ISO"):
-        raise unread(block, f"TYPE={kind} is not read, only isotropic materials")
-    rows = list(block.rows())
-    wanted = 2 if block.keyword == "ELASTIC" else 1
-    if len(rows) != 1:
-        raise unread(block, f"has {len(rows)} lines of data: values by temperature are not read")
-    place, fields = rows[0]
-    if len(fields) < wanted:
-        raise input_error(place, f"needs {wanted} numbers, got {len(fields)}", "Check the line.")
-    values = [real_number(text, place, "value") for text in fields[:wanted]]
-    if block.keyword == "ELASTIC":
-        model.elastic[material] = (values[0], values[1])
-    else:
-        model.density[material] = values[0]
+    table = model.elastic if block.keyword == "ELASTIC" else model.density
+    table[material] = read_constants(block)
 
 
 def _section(model: DeckModel, block: Block) -> None:
-    if "ORIENTATION" in block.parameters:
-        raise unread(block, "an ORIENTATION is not read")
     name, elements = block.parameter("MATERIAL").upper(), block.parameter("ELSET").upper()
     if elements not in model.element_sets:
         raise unknown(block.place, "element set", elements, list(model.element_sets))
-    model.sections.append((name, elements, block.place))
+    model.sections.append((name, block.parameters.get("ORIENTATION", "").upper(), elements, block.place))
+
+
+def _orientation(model: DeckModel, block: Block) -> None:
+    model.orientations[block.parameter("NAME").upper()] = block
 
 
 def unknown(place: str, what: str, name: str, known: list[str]) -> InputError:
@@ -351,6 +342,7 @@ def _cyclic_model(model: DeckModel, block: Block) -> None:
 
 _ACTIONS = {
     "SOLID SECTION": _section,
+    "ORIENTATION": _orientation,
     "BOUNDARY": _boundary,
     "DLOAD": _distributed_load,
     "STEP": _step,

@@ -18,6 +18,7 @@ PARAMETERS: dict[str, frozenset[str]] = {
         ("ELASTIC", ["TYPE", "INPUT"], ["MODULI"]),
         ("DENSITY", ["INPUT"], []),
         ("SOLID SECTION", ["ELSET", "MATERIAL", "ORIENTATION"], ["CONTROLS", "NODAL THICKNESS"]),
+        ("ORIENTATION", ["NAME", "SYSTEM", "DEFINITION", "INPUT"], []),
         ("BOUNDARY", ["OP", "TYPE", "INPUT"], ["AMPLITUDE", "TIME DELAY", "LOAD CASE", "FIXED"]),
         ("DLOAD", ["OP", "AMPLITUDE", "INPUT"], ["TIME DELAY", "LOAD CASE"]),
         (
@@ -169,7 +170,6 @@ REFUSED = frozenset(
         "GAP",
         "SUBMODEL",
         "MODEL CHANGE",
-        "ORIENTATION",
         "PRE-TENSION SECTION",
         "USER ELEMENT",
         "MATRIX INPUT",

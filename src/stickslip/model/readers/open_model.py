@@ -169,10 +169,7 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
     shown = mesh_summary(deck.mesh, f"deck of {deck.element_type} cells")
     structure = assemble_deck(deck)
     found = structure_summary(structure, n_modes=n_modes, units=units, say=say)
-    remarks = [
-        f"material {name}: E {m.young_modulus:.4g} Pa, ν {m.poisson_ratio:g}, ρ {m.density:.4g} kg/m³"
-        for name, m in deck.materials.items()
-    ]
+    remarks = [f"material {name}: {m.in_words}" for name, m in deck.materials.items()]
     if deck.sectors:
         remarks.append(f"one of {deck.sectors} sectors; frequencies with free cyclic faces")
     if deck.speed is not None:
