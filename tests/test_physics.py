@@ -25,6 +25,7 @@ from stickslip.response.damping_of_modes import (
     range_modes,
     springs_of,
 )
+from stickslip.response.self_excited.modes import natural_frequencies
 from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
 
@@ -150,6 +151,36 @@ def test_what_friction_can_do_to_one_mass_is_its_describing_function():
     physics = Physics((mode,), (), friction, (other, best), True)
     assert physics.ends(mode) == best.ends
     assert physics.ends(replace(mode, omega=3.0)) == 3.0
+
+
+def test_what_friction_can_do_to_a_whirling_mass_is_its_describing_function_with_coriolis_forces():
+    """In the rotating frame an isotropic rotor whirls at √k ± Ω, also with the complex stiffness of sliders: (Ω ∓ ω)² = k."""
+    speed, k = 30.0, 1e4
+    turning = 2.0 * speed * np.array([[0.0, -1.0], [1.0, 0.0]])
+    body = ss.model.lumped(np.eye(2), (k - speed**2) * np.eye(2), names=("x", "y")).with_damping(turning)
+    brakes = {
+        n: ss.Contact(between=(f"rotor.{n}", "ground"), law=ss.Jenkins(k_t=2e3, limit=1.0), acts="tangential")
+        for n in "xy"
+    }
+    model = ss.Model(
+        parts={"rotor": ss.Part(structure=body)},
+        contacts=brakes,
+        loads={"f": ss.Load(on="rotor.x", newton=1.0)},
+        outputs=(ss.Output(name="x", on="rotor.x"),),
+    )
+    found = assemble(model, 1)
+    friction = friction_of(found.system.springs, found.static_gap, found.static_force)
+    springs = springs_of(found.system, np.ones(2, dtype=bool))
+    both = damped_modes(found.system, friction, springs, 1, Range(5 * HZ, 30 * HZ))
+    every = np.sqrt([k + 2e3 * complex_stiffness(x) for x in np.geomspace(1.0, 1e4, 20)])
+    for own, turn in zip(sorted(both, key=lambda m: m.stuck), (-speed, speed), strict=True):
+        roots = every + turn
+        assert own.stuck == pytest.approx(roots[0].real, rel=1e-9)
+        assert own.ends == pytest.approx(np.sqrt(k) + turn, rel=1e-4)
+        assert own.ratio == pytest.approx(np.max(roots.imag / np.abs(roots)), rel=1e-9)
+    for each, stiffness in ((springs, 1.2e4), (0.0 * springs, k)):
+        hertz = natural_frequencies(found.system, 2, each)
+        np.testing.assert_allclose(hertz * HZ, np.sqrt(stiffness) + np.array([-speed, speed]), rtol=1e-9)
 
 
 def test_a_peak_that_nothing_damps_is_wrong():

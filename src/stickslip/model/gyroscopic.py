@@ -77,7 +77,7 @@ def gyroscopic_modes(
             f"{n_modes} modes asked of {movable} dofs with mass, {n_basis} in the basis",
             "Ask for at least one, and at most as many as the basis has.",
         )
-    G = 0.5 * (structure.damping - structure.damping.T.conj())
+    G = structure.coriolis
     if structure.n <= DENSE:
         modes = normal_modes(structure, movable)
         squares, shapes = modes.squares, modes.shapes

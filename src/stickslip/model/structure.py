@@ -11,6 +11,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
 
 NAMED = 8  # number of sets that a short description names
+ROUNDING = 1e-10  # skew part of a damping matrix over the matrix, below which it is rounding
 _NUMBERED = re.compile(r"dof[1-9]\d*")
 
 ROTATIONS = ("rx", "ry", "rz")  # components that are angles
@@ -189,6 +190,20 @@ class Structure:
         """Return the structure with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         sparse = scipy.sparse.issparse(self.stiffness)
         return replace(self, stiffness=self.stiffness + (springs if sparse else springs.toarray()))
+
+    @property
+    def coriolis(self) -> Matrix:
+        """The skew part of the damping matrix, (n, n): Coriolis forces of a rotating structure."""
+        return 0.5 * (self.damping - self.damping.conj().T)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the damping matrix has Coriolis forces, beyond rounding."""
+        skew, every = (
+            scipy.sparse.linalg.norm(m) if scipy.sparse.issparse(m) else np.linalg.norm(m)
+            for m in (self.coriolis, self.damping)
+        )
+        return bool(skew > ROUNDING * every)
 
     def with_damping(self, damping: Matrix) -> "Structure":
         """Return the same structure with another damping matrix."""

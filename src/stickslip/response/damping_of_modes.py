@@ -3,7 +3,7 @@
 Each contact law is replaced by its Coulomb limit. A slipping contact is a spring with the complex stiffness ``k η(x)``,
 with the same slip ratio x for all contacts: the gap amplitude over the amplitude at the onset of slip. From stuck (x =
 1) to sliding (x large), each mode is tracked by its shape. The result is an estimate, no bound: for chains of masses
-with constant normal loads it was right within a factor of 1.5.
+with constant normal loads it was right within a factor of 1.5. Coriolis forces are included.
 """
 
 from dataclasses import dataclass
@@ -332,8 +332,8 @@ def damped_modes(
     rest, slider = (
         (moved.conj().T * own) @ moved for own in (np.where(slips, 0.0, springs), np.where(slips, springs, 0.0))
     )
-    squares = _followed(0.5 * (stiffness + stiffness.conj().T) + rest, slider)
-    roots = np.sqrt(squares) / harmonic
+    coriolis = way.conj().T @ (structure.coriolis @ way) if structure.turns else None
+    roots = _followed(0.5 * (stiffness + stiffness.conj().T) + rest, slider, coriolis) / harmonic
     damping = roots.imag / np.abs(roots)
     found = []
     for omega, ratio in zip(np.abs(roots).T, damping.T, strict=True):
@@ -351,17 +351,30 @@ def _spanned(mass: ComplexArray, shapes: ComplexArray) -> ComplexArray:
     return np.asarray(shapes @ (turn[:, kept] / np.sqrt(square[kept])))
 
 
-def _followed(rest: ComplexArray, slider: ComplexArray) -> ComplexArray:
-    """Return the (20, m) squared complex frequencies of each mode from stuck to sliding."""
-    values, vectors = np.linalg.eigh(rest + slider)
-    every = [values.astype(complex)]
+def _followed(rest: ComplexArray, slider: ComplexArray, coriolis: ComplexArray | None) -> ComplexArray:
+    """Return the (20, m) complex frequencies of each mode from stuck to sliding, rad/s."""
+    values, vectors = _complex_modes(rest + slider, coriolis, undamped=True)
+    every = [values]
     for ratio in SLIP_RATIOS[1:]:
-        own, shapes = np.linalg.eig(rest + complex_stiffness(float(ratio)) * slider)
-        shapes = shapes / np.linalg.norm(shapes, axis=0)
+        own, shapes = _complex_modes(rest + complex_stiffness(float(ratio)) * slider, coriolis)
         order = _partners(np.abs(vectors.conj().T @ shapes))
         vectors = shapes[:, order]
         every.append(own[order])
     return np.array(every)
+
+
+def _complex_modes(
+    stiffness: ComplexArray, coriolis: ComplexArray | None, *, undamped: bool = False
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return complex frequencies and shapes of unit length of ``K + iω G - ω²``: one of each pair ±ω, by rising frequency if undamped."""
+    if coriolis is None:
+        squares, shapes = np.linalg.eigh(stiffness) if undamped else np.linalg.eig(stiffness)
+        return np.sqrt(squares.astype(complex)), shapes / np.linalg.norm(shapes, axis=0)
+    n = len(stiffness)
+    rates, states = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -coriolis]]))
+    positive = np.argsort(-rates.imag, kind="stable")[:n][::-1]
+    shapes = states[:n, positive]
+    return -1j * rates[positive], shapes / np.linalg.norm(shapes, axis=0)
 
 
 def _partners(alike: FloatArray) -> IntArray:

@@ -8,7 +8,6 @@ import numpy as np
 from stickslip.analyses.forced_response.estimate import Estimate, estimate
 from stickslip.analyses.forced_response.physics.known import (
     LISTED,
-    RIGID,
     doubts_of_model,
     mixed_places,
     no_resonance,
@@ -17,7 +16,7 @@ from stickslip.analyses.forced_response.physics.known import (
 )
 from stickslip.analyses.forced_response.physics.limits import NAMED_MODES, Physics, beforehand, driven_line, physics_of
 from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
-from stickslip.analyses.forced_response.problem import Question, question_of
+from stickslip.analyses.forced_response.problem import STILL_HZ, Question, question_of
 from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
 from stickslip.analyses.forced_response.stability.stable import cost_lines
@@ -110,14 +109,15 @@ def beside_the_range(question: Question) -> list[str]:
     """Return the natural frequencies below, in and above the range of the sweep; of a model with contacts, with these open and stuck."""
     times = question.driven[0]
     lowest, highest = (times * omega / HZ for omega in question.sweep.omega_range)
-    known, told = question.model.frequencies, []
+    told: list[str] = []
     if times > 1:
         told.append(
             f"{question.driven_names[0]} acts at {times} times the swept frequencies: {lowest:.2f} to {highest:.2f} Hz"
         )
-    both = ((", contacts open", known.free_reduced), (", contacts stuck", known.stuck_reduced))
-    for state, hertz in both if question.model.contacts.names else (("", known.free_reduced),):
-        rigid = int(np.count_nonzero(hertz < RIGID))
+    free, stuck = question.natural_states
+    both = ((", contacts open", free), (", contacts stuck", stuck))
+    for state, hertz in both if question.model.contacts.names else (("", free),):
+        rigid = int(np.count_nonzero(hertz < STILL_HZ))
         elastic = hertz[rigid:]
         pieces = [f"{rigid} of rigid motions"] * bool(rigid)
         pieces += _listed(elastic[elastic < lowest][-1:], "below")
@@ -192,7 +192,7 @@ def _frequencies_far_off(question: Question) -> Iterator[str]:
     if len(question.driven) > 1:
         return
     (lowest, highest), every = question.driven_hz, question.natural_hz
-    every = every[every > RIGID]
+    every = every[every > STILL_HZ]
     if not every.size:
         return
     factor = max(every.min() / highest, lowest / every.max())

@@ -32,6 +32,7 @@ from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.response.self_excited.modes import natural_frequencies
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.response.time.transient import TimeStepping
@@ -129,6 +130,7 @@ def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, floa
 
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+STILL_HZ = 5e-3  # lower frequencies are those of rigid motions
 STABLE = "stability"  # check of every run, unless the study turns it off
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # part of the sentence on a motion that was not integrated
@@ -226,8 +228,25 @@ class Question:
     @property
     def natural_hz(self) -> FloatArray:
         """Natural frequencies with open and with stuck contacts, Hz."""
-        known = self.model.frequencies
-        return np.concatenate([known.free_reduced, known.stuck_reduced])
+        return np.concatenate(self.natural_states)
+
+    @cached_property
+    def natural_states(self) -> tuple[FloatArray, FloatArray]:
+        """Natural frequencies with open and with stuck contacts, Hz; with Coriolis forces where a reduced model has them."""
+        model = self.model if self.model.blades is None else self.model.blades.tuned
+        known, harmonic = (model.frequencies.free_reduced, model.frequencies.stuck_reduced), self.driven[0]
+        if not model.system.structure.reduced:
+            return known
+        system = model.system.at(0.5 * sum(self.sweep.omega_range))
+        if not system.structure.of_harmonic(harmonic).turns:
+            return known
+        stuck = system.springs.stuck_stiffness()
+        bodies = 0 if system.free is None else system.free.size
+        free, held = (
+            natural_frequencies(system, own.size + bodies, springs, harmonic)
+            for own, springs in zip(known, (0.0 * stuck, stuck), strict=True)
+        )
+        return free[free > STILL_HZ][: known[0].size], held[: known[1].size]
 
     @property
     def driven_names(self) -> tuple[str, ...]:

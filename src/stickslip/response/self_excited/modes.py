@@ -8,6 +8,7 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
@@ -101,11 +102,7 @@ def sprung_modes(
     """
     if not system.structure.reduced:
         one_structure(system.structure, "stuck_modes")
-    own = system.structure.of_harmonic(harmonic)
-    bound = with_springs(own, system.interface.gap_operator, springs)
-    elastic = replace(bound, stiffness=_hermitian(bound.stiffness), mass=_hermitian(bound.mass))
-    # copies of dofs for contacts, and their constraint forces, have no mass and are no independent coordinates
-    way = own_motions(elastic, system.structure.multipliers)
+    bound, elastic, way = _bound(system, springs, harmonic)
     dofs = elastic.dofs.take(np.arange(way.shape[1]))
     still, free = (in_coordinates(one, way, dofs, {}) for one in (elastic, bound))
     basis, rigid = _basis(still, free, count, whole)
@@ -122,6 +119,27 @@ def sprung_modes(
         StuckMode(rigid + i + 1, float(abs(value)), float(ratio), np.asarray(shape, dtype=complex))
         for i, (value, ratio, shape) in enumerate(zip(values, ratios, shapes.T, strict=True))
     ]
+
+
+def natural_frequencies(system: System, count: int, springs: FloatArray, harmonic: int = 1) -> FloatArray:
+    """Return the lowest natural frequencies in Hz, with Coriolis forces and without damping.
+
+    Parameters
+    ----------
+    system, count, springs, harmonic
+        As in `sprung_modes`.
+    """
+    elastic, way = _bound(system, springs, harmonic)[1:]
+    moving = in_coordinates(elastic, way, elastic.dofs.take(np.arange(way.shape[1])), {})
+    return gyroscopic_modes(moving, min(count, int(np.count_nonzero(moving.mass.diagonal())))).frequencies_hz
+
+
+def _bound(system: System, springs: FloatArray, harmonic: int) -> tuple[Structure, Structure, Matrix]:
+    """Return the structure with springs, the same with symmetric stiffness and mass, and the basis of its independent coordinates."""
+    bound = with_springs(system.structure.of_harmonic(harmonic), system.interface.gap_operator, springs)
+    elastic = replace(bound, stiffness=_hermitian(bound.stiffness), mass=_hermitian(bound.mass))
+    # copies of dofs for contacts, and their constraint forces, have no mass and are no independent coordinates
+    return bound, elastic, own_motions(elastic, system.structure.multipliers)
 
 
 def _basis(still: Structure, free: Structure, count: int, whole: int) -> tuple[Matrix, int]:

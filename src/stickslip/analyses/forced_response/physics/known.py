@@ -16,7 +16,6 @@ from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
 
 COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
-RIGID = 5e-3  # Hz; lower frequencies are printed as zero
 LISTED = 5  # natural frequencies that a line names
 
 
