@@ -17,7 +17,7 @@ from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts import working_range
 from stickslip.analyses.forced_response.verdicts.working_range import WorkingRange
-from stickslip.report.cases import cases_of, families_of
+from stickslip.report.cases import cases_of, families_of, without_common_words
 from stickslip.report.content import Words
 from stickslip.report.paper.figure import draw
 from stickslip.study.file.case_names import Naming
@@ -75,6 +75,24 @@ def test_names_that_do_not_tell_families_apart_give_way_to_keys() -> None:
     every = list(product((1.0, 2.0), (3.0, 4.0)))
     data = study({FORCE: [f for f, _ in every], MASS: [m for _, m in every]}, ["one", "two", "three", "four"])
     assert families(data, FORCE) == {f"{MASS} = 3": [0, 2], f"{MASS} = 4": [1, 3]}
+
+
+@pytest.mark.parametrize(
+    ("names", "title", "short"),
+    [
+        (["force 1 N, mu 0.3", "force 2 N, mu 0.3"], "force", ["1 N, mu 0.3", "2 N, mu 0.3"]),
+        (["slip limit 1 N, k 2 N", "slip limit 3 N, k 4 N"], "slip limit, k", ["1 N, 2 N", "3 N, 4 N"]),
+        (["10 g, mu 0.3", "20 g, mu 0.5"], "mu", ["10 g, 0.3", "20 g, 0.5"]),
+        (["light", "heavy"], "", ["light", "heavy"]),
+        (["a, b", "c"], "", ["a, b", "c"]),
+        (["force 1 N"], "", ["force 1 N"]),
+        (["a.b = 1", "a.b = 2"], "", ["a.b = 1", "a.b = 2"]),
+    ],
+)
+def test_what_names_have_in_common_becomes_the_title_of_their_axis(
+    names: list[str], title: str, short: list[str]
+) -> None:
+    assert without_common_words(names) == (title, short)
 
 
 def test_every_case_stands_in_one_family_and_the_families_are_sorted_by_value() -> None:
@@ -138,9 +156,12 @@ def test_the_map_of_all_peaks_shows_them_in_their_rows_and_frames_the_smallest()
     rows, columns = list(cells.y), list(cells.x)
     assert len(rows) == 12
     assert columns == ["1", "2", "3", "4", "5"]
+    assert plot.figure.layout.yaxis.title.text == "mass, mu"
+    assert not cells.showscale  # the numbers stand in the cells
     for case in response.cases:
-        force, _, others = case.label.partition(", ")
-        shown = cells.z[rows.index(others)][columns.index(force.split()[1])]
+        force, mass, mu = case.label.split(", ")
+        row = f"{mass.removeprefix('mass ')}, {mu.removeprefix('mu ')}"
+        shown = cells.z[rows.index(row)][columns.index(force.split()[1])]
         assert 10.0**shown == pytest.approx(response.peak_response(case) * response.scale.factor, rel=1e-9)
     assert [text for row in cells.text for text in row if text.endswith("?")] == [cells.text[0][0]]
     (frame,) = plot.figure.layout.shapes

@@ -10,12 +10,14 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 import xarray as xr
 from browser import CHROMIUM, Browser
 from study_texts import JENKINS, study_of
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
+import stickslip as ss
 from stickslip.analyses.forced_response.page.at_peak.bodies import body_motion, rigid_bodies
 from stickslip.analyses.forced_response.page.at_peak.contacts import hysteresis_t
 from stickslip.analyses.forced_response.page.chapter import cards, peaks
@@ -30,8 +32,10 @@ from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures import edges, reduction, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
+from stickslip.report.cases import without_common_words
 from stickslip.report.content import Table
-from stickslip.report.plot import log_ticks
+from stickslip.report.frame import Chapter, Placing, page_html
+from stickslip.report.plot import Plot, log_ticks, styled
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.result import Node
 from stickslip.report.tiles import patches, triangulated
@@ -256,6 +260,48 @@ def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
     assert first["verdict"] < first["answer"] < first["figure"] < 900
     assert first["wide"] >= 480
     assert 20 < first["words"] <= 90, first["all"]
+
+
+@needs_browser
+@pytest.mark.parametrize("ratios", [(50, 20, 5), (5,)])
+def test_the_first_screen_of_a_comparison_holds_verdict_answer_and_figure(
+    browser: Browser, tmp_path: Path, ratios: tuple[float, ...]
+) -> None:
+    results = [
+        ss.Result(tree_of(forced_response=light(synthetic_result(ratios=own)))) for own in (ratios, ratios[::-1])
+    ]
+    page = tmp_path / "both.html"
+    ss.compare(*results, names=("before", "after")).report(page)
+    browser.width(760)
+    browser.open(page)
+    browser.until("document.querySelector('figure .nsewdrag')")
+    first = browser.run(FIRST)
+    assert first["verdict"] < first["answer"] < first["figure"] < 900
+    assert first["wide"] >= 480
+    assert 20 < first["words"] <= 90, first["all"]
+    assert "peak, equal to" in first["all"]
+
+
+@needs_browser
+def test_the_numbers_of_a_map_fit_their_cells_on_a_narrow_screen(browser: Browser, tmp_path: Path) -> None:
+    names = [f"tangential stiffness {k} N/mm, force {f} N" for k in (20, 50, 100) for f in (2, 5, 10)]
+    columns = ["0.5", "1", "2", "5", "20"]
+    texts = [[f"{300 + 10 * row + k}" for k in range(5)] for row in range(9)]
+    title, rows = without_common_words(names)
+    cells = go.Heatmap(x=columns, y=rows, z=np.arange(45.0).reshape(9, 5), text=texts, texttemplate="%{text}")
+    figure = styled(go.Figure(cells.update(showscale=False)), 400).update_yaxes(type="category", title_text=title)
+    figure.update_xaxes(type="category")
+    shown = Placing()([Plot("map", "Map", "", figure)])
+    page = tmp_path / "map.html"
+    page.write_text(page_html("Map", "", [Chapter("map", "Map", shown)]), encoding="utf-8")
+    browser.width(400)
+    browser.open(page)
+    browser.until("document.querySelectorAll('.heatmap-label').length === 45")
+    widest = browser.run(
+        "Math.max(...[...document.querySelectorAll('.heatmap-label')].map(t => t.getBoundingClientRect().width))"
+    )
+    panel = browser.run("document.querySelector('.nsewdrag').getBoundingClientRect().width")
+    assert 12 < widest < panel / 5
 
 
 @needs_browser

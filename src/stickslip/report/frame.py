@@ -20,7 +20,7 @@ from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
 from stickslip.study.store.atomic_write import write_whole
-from stickslip.study.verdict import Verdict, likewise, of_kinds, once, worst_first
+from stickslip.study.verdict import JOINT, Verdict, likewise, of_kinds, once, worst_first
 
 _CONFIG = {
     "responsive": True,
@@ -29,6 +29,8 @@ _CONFIG = {
     # pictures are saved for print, at twice the size on the screen
     "toImageButtonOptions": {"scale": 2},
 }
+MOST_IN_NARROW = 6  # columns of numbers that a map shows on a narrow screen
+LONGEST_LINE = 28  # letters of a line of a legend
 PLURAL = ("note", "warning")  # words of verdicts with a plural; the others are levels
 _BOLD, _CODE = re.compile(r"\*\*(.+?)\*\*"), re.compile(r"`([^`]+)`")
 
@@ -120,7 +122,7 @@ class Placing:
             return Placed(own, _kind(own))
         self.figures += 1
         drawing = to_html(
-            _slim(own.figure.to_dict()),
+            _slim(_in_short_lines(own.figure.to_dict())),
             config=_CONFIG,
             full_html=False,
             include_plotlyjs=False,
@@ -128,8 +130,28 @@ class Placing:
             validate=False,
         )
         ends = [axis.domain[1] for axis in own.figure.select_xaxes() if axis.domain]
-        wide = min(ends, default=1.0) < 0.9 or len(list(own.figure.select_scenes())) > 1
+        columns = max(
+            (len(map_.x) for map_ in own.figure.select_traces({"type": "heatmap"}) if map_.text is not None), default=0
+        )
+        wide = min(ends, default=1.0) < 0.9 or len(list(own.figure.select_scenes())) > 1 or columns > MOST_IN_NARROW
         return Placed(own, "figure", self.figures, Markup(drawing), wide)
+
+
+def _in_short_lines(drawn: dict[str, Any]) -> dict[str, Any]:
+    """Return a plotly figure with legend entries broken between the parts of long names."""
+    for trace in drawn["data"]:
+        if trace.get("showlegend") is not False and len(trace.get("name") or "") > LONGEST_LINE:
+            trace["name"] = _broken(trace["name"])
+    return drawn
+
+
+def _broken(name: str) -> str:
+    lines = [""]
+    for part in name.split(JOINT):
+        if lines[-1] and len(lines[-1]) + len(part) > LONGEST_LINE:
+            lines.append("")
+        lines[-1] += f"{JOINT}{part}" if lines[-1] else part
+    return ",<br>".join(lines)
 
 
 def _slim(drawn: Any) -> Any:

@@ -1,7 +1,7 @@
 """The page of a comparison of designs: peaks, responses, optimisation curves, inputs."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -13,9 +13,9 @@ from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, families_of, first_number
-from stickslip.report.content import Table, Words, chooser
-from stickslip.report.frame import Chapter, Placing, page_html
+from stickslip.report.cases import ShownCase, families_of, first_number, without_common_words
+from stickslip.report.content import Chooser, Table, Words, chooser
+from stickslip.report.frame import Chapter, Conclusion, Placing, concluded, page_html
 from stickslip.report.plot import BROKEN, COLOURS, DASHES, INK, MUTED, Plot, log_ticks, styled
 from stickslip.report.quantities import (
     NONE,
@@ -31,7 +31,7 @@ from stickslip.report.quantities import (
 )
 from stickslip.report.section import Card, Content
 from stickslip.study.varied import naming_of
-from stickslip.study.verdict import POINT_LEVELS, UNSTABLE, conclusion
+from stickslip.study.verdict import JOINT, POINT_LEVELS, UNSTABLE, conclusion, not_trusted, of_tree
 
 _BEST = "best of each"
 _CHOICE = ("selection", "high_order", "passages")  # attributes that say how harmonics were chosen
@@ -230,8 +230,14 @@ def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, 
         return None
     names = list(dict.fromkeys(families[row.case][0] for row in rows))
     values = sorted({families[row.case][1] for row in rows})
-    naming = naming_of(told[0][1].data, key)
-    figure = make_subplots(1, len(later), shared_yaxes=True, subplot_titles=later, horizontal_spacing=0.03)
+    naming, (title, rows_of) = naming_of(told[0][1].data, key), without_common_words(names)
+    figure = make_subplots(
+        1,
+        len(later),
+        shared_yaxes=True,
+        subplot_titles=[f"{name} against {told[0][0].name} (%)" for name in later],
+        horizontal_spacing=0.03,
+    )
     most = max(abs(row.off_percent) for row in rows) or 1.0
     for k, design in enumerate(later, 1):
         off = np.full((len(names), len(values)), np.nan)
@@ -240,23 +246,23 @@ def _differences_of_peaks(told: Sequence[tuple[Design, Response]], key: str, *, 
                 off[names.index(families[row.case][0]), values.index(families[row.case][1])] = row.off_percent
         cells = go.Heatmap(
             x=[number(naming.shown(v), 4) for v in values],
-            y=names,
+            y=rows_of,
             z=off,
             text=[[number(v, 2) if np.isfinite(v) else "" for v in line] for line in off],
             texttemplate="%{text}",
             zmin=-most,
             zmax=most,
             colorscale=[[0.0, COLOURS[2]], [0.5, "#ffffff"], [1.0, COLOURS[1]]],
-            colorbar={"title": {"text": "%"}, "thickness": 14},
-            showscale=k == len(later),
+            showscale=False,
             hovertemplate=f"%{{y}}, %{{x}}<br>%{{z:.3g}} %<extra>{design}</extra>",
         )
         figure.add_trace(cells, 1, k)
     styled(figure, 170 + 26 * len(names))
     figure.update_xaxes(type="category", title_text=naming.title)
     figure.update_yaxes(type="category", autorange="reversed")
+    figure.update_yaxes(title_text=title, col=1)
     worst, best = (pick(rows, key=lambda row: row.off_percent) for pick in (max, min))
-    text = f"Peak of each case over the one of {told[0][0].name}, in percent. Largest: {number(worst.off_percent)} % ({worst.design}, {worst.case}); smallest: {number(best.off_percent)} % ({best.design}, {best.case})."
+    text = f"Peak of each case over the one of {told[0][0].name}, in percent: orange where it is larger, green where it is smaller. Largest: {number(worst.off_percent)} % ({worst.design}, {worst.case}); smallest: {number(best.off_percent)} % ({best.design}, {best.case})."
     return Plot("compared_optimisation", "Peaks against the first design", text, figure)
 
 
@@ -500,11 +506,68 @@ def contents(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> list
     return [chapter for chapter in kept if chapter[2]]
 
 
+def answer(designs: Sequence[Design], *, divided: bool) -> Card | None:
+    """Return the design with the smallest best peak, held against the first design, or against the next one if it is the first.
+
+    Designs under other loads than the first one are left out. None if fewer than two designs have a response.
+    """
+    told = [(d, d.response, c) for d in designs if d.response and (c := d.best(divided=divided))]
+    if len(told) < 2:
+        return None
+    unit, first = unit_of(designs, divided=divided), told[0]
+    height = {d.name: _peak(r, c, divided=divided) for d, r, c in told}
+    alike = [own for own in told if _same_load(own[2].excitation, first[2].excitation)]
+    rising = sorted(alike, key=lambda own: height[own[0].name])
+    best = rising[0]
+    other = next((own for own in (first, *rising) if own is not best), None)
+    what = "best peak" if choices(designs) else "peak"
+    value = f"{best[0].name}: {quantity(height[best[0].name], unit)}"
+    if other is None:
+        loads = joined([f"{quantity(c.excitation, 'N')} ({d.name})" for d, _, c in told])
+        return Card(value, what, f"Not compared, as the loads differ: {loads}.")
+    off = over_first(height[best[0].name], height[other[0].name])
+    label = f"{what}, {percent(abs(off), 3)} below {other[0].name}" if off else f"{what}, equal to {other[0].name}"
+    each = [
+        f"{d.name}: {quantity(height[d.name], unit)} at {number(r.peak_hz(c), 5)} Hz{c.where}, {r.level(c) or 'no verdict'}"
+        for d, r, c in (best, other)
+    ]
+    return Card(value, label, f"{'. '.join(each)}.")
+
+
+def _concluded(designs: Sequence[Design]) -> Conclusion:
+    """Return the verdicts of all designs for the head of the page, each with the name of its design."""
+    lines = {d.name: conclusion(d.tree) for d in designs}
+    same = len({*lines.values()}) == 1
+    told = (
+        f"In each design: {lines[designs[0].name]}" if same else " ".join(f"{n}: {line}" for n, line in lines.items())
+    )
+    every = [replace(v, case=JOINT.join(filter(None, (d.name, v.case)))) for d in designs for v in of_tree(d.tree)]
+    return concluded(every, told, bad=any(not_trusted(d.tree) for d in designs))
+
+
 def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] = ()) -> str:
-    """Return the page of a comparison; an `InputError` if curves cannot be compared with the designs."""
-    placing = Placing()
-    chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
+    """Return the page of a comparison; an `InputError` if curves cannot be compared with the designs.
+
+    The page begins with the verdicts, the answer and its figure: the optimisation curves, else the responses.
+    """
+    placing, divided = Placing(), per_force(designs, curves)
+    each = {key: (title, list(own)) for key, title, own in contents(designs, curves) if key != "verdicts"}
+    tiles, best = cards(designs, divided=divided), answer(designs, divided=divided)
+    above: list[Content] = []
+    for key in ("optimisation", "responses"):
+        if not above and best is not None and key in each:
+            own = each[key][1]
+            above = [part for part in own if isinstance(part, Plot | Chooser)]
+            each[key] = (each[key][0], [part for part in own if part not in above])
+    head = placing(above)
+    chapters = [Chapter(key, title, placing(own)) for key, (title, own) in each.items() if own]
     names = [d.name for d in designs]
     made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")
-    head = cards(designs, divided=per_force(designs, curves))
-    return page_html(f"{joined(names)} compared", made, chapters, cards=head)
+    return page_html(
+        f"{joined(names)} compared",
+        made,
+        chapters,
+        cards=tiles if best is None else [best, *tiles],
+        answer=head,
+        conclusion=_concluded(designs),
+    )

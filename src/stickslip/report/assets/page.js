@@ -6,13 +6,13 @@ const choose = (section, chosen) => {
   });
 };
 document.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {
-  const section = button.closest("section");
+  const section = button.closest("section, .first");
   section.querySelectorAll(".chooser button").forEach(
     other => other.setAttribute("aria-pressed", String(other === button)));
   choose(section, button.dataset.case);
 }));
 document.querySelectorAll(".chooser select").forEach(list => list.addEventListener(
-  "change", () => choose(list.closest("section"), list.value)));
+  "change", () => choose(list.closest("section, .first"), list.value)));
 // on a narrow screen numbers along an axis stay upright, and as many as there is room for
 if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot => {
   const all = plot._fullLayout || {}, change = {};
@@ -49,10 +49,10 @@ const cell = own => `"${own.innerText.replace(/\u202f/g, "").replace(/\u2212/g, 
 document.querySelectorAll("button.csv").forEach(button => button.addEventListener("click", () => {
   const rows = [...button.closest(".table").querySelectorAll("tr")];
   const text = rows.map(row => [...row.cells].map(cell).join(",")).join("\r\n");
-  const link = document.createElement("a"), section = button.closest("section");
+  const link = document.createElement("a"), section = button.closest("section, .first");
   const number = [...section.querySelectorAll("button.csv")].indexOf(button) + 1;
   link.href = URL.createObjectURL(new Blob(["\ufeff", text], {type: "text/csv"}));
-  link.download = `${section.id}_${number}.csv`;
+  link.download = `${section.id || "answer"}_${number}.csv`;
   link.click();
 }));
 // paper shows what is folded away

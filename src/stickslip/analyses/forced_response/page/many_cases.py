@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, families_of, first_number
+from stickslip.report.cases import ShownCase, families_of, first_number, without_common_words
 from stickslip.report.plot import COLOURS, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, number, scale_for
 from stickslip.study.file.case_names import Naming
@@ -126,7 +126,8 @@ def all_peaks(response: Response, key: str, curves: Mapping[str, Sequence[ShownC
     scale = scale_for(np.array([response.peak_response(c) for c in cases]), response.unit)
     if len(curves) <= MOST_ROWS and 2 * len(cases) >= len(curves) * len(columns):
         figure = _map(response, curves, columns, scale, naming_of(response.data, key))
-        return Plot("optimisation", "Peaks of all cases", f"{_ABOUT_MAP}{caption}", figure)
+        about = f"Peak {response.quantity} in {scale.unit}. {_ABOUT_MAP}"
+        return Plot("optimisation", "Peaks of all cases", f"{about}{caption}", figure)
     return Plot("optimisation", "Peaks of all cases", f"{_ABOUT_AXES}{caption}", _parallel(response, cases, scale))
 
 
@@ -166,18 +167,20 @@ def _map(
         [f"{number(float(v), 3)}{mark}" if np.isfinite(v) else "" for v, mark in zip(*row, strict=True)]
         for row in zip(size, marks, strict=True)
     ]
-    y = list(curves)
+    title, y = without_common_words(list(curves))
+    numbered = len(columns) <= _FEW_COLUMNS  # a colour bar beside the numbers would only take their place
     figure = go.Figure(
         go.Heatmap(
             x=[number(naming.shown(v), 4) for v in columns],
             y=y,
             z=np.log10(size),
             text=texts,
-            texttemplate="%{text}" if len(columns) <= _FEW_COLUMNS else None,
+            texttemplate="%{text}" if numbered else None,
             customdata=told,
             hovertemplate=f"%{{customdata[0]}}<br>%{{text}} {scale.unit} at %{{customdata[1]}}<extra></extra>",
             colorscale=_SCALE,
             colorbar=_bar(scale, response, size[np.isfinite(size)]),
+            showscale=not numbered,
             xgap=1,
             ygap=1,
         )
@@ -187,7 +190,7 @@ def _map(
     figure.add_shape(type="rect", **corners, line={"color": COLOURS[1], "width": 2.4})
     styled(figure, _AROUND + _ROW_HEIGHT * len(y))
     figure.update_xaxes(type="category", showgrid=False, title_text=naming.title)
-    figure.update_yaxes(type="category", showgrid=False, autorange="reversed")
+    figure.update_yaxes(type="category", showgrid=False, autorange="reversed", title_text=title)
     return figure
 
 
