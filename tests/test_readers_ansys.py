@@ -487,7 +487,7 @@ NBLOCK,6,SOLID,         8,         8
 {nodes}N,R5.3,LOC,       -1,
 EBLOCK,19,SOLID,         1,         1
 (19i9)
-        1        1        1        1        0        0        0        0        8        0        9{cell}
+        3        1        1        1        0        0        0        0        8        0        9{cell}
        -1
 MPDATA,R5.0, 1,EX  ,       3, 1, 2.1E+05,
 MPDATA,R5.0, 1,PRXY,       3, 1, 0.3,
@@ -550,7 +550,7 @@ def test_spoilt_archives_name_the_place(tmp_path, old, new, message):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("MPDATA,R5.0, 1,EY  ,       3, 1, 1.1E+05,", "material 3: is orthotropic"),
+        ("MPDATA,R5.0, 1,EY  ,       3, 1, 1.1E+05,", "material 3: MPDATA: is orthotropic and lacks EZ, GXY"),
         ("MPDATA,R5.0, 2,EX  ,       3, 1, 1.1E+05, 1.0E+05,", "EX depends on temperature"),
         ("MP,EX,3,much", "'much' is no number"),
     ],
@@ -600,8 +600,8 @@ def test_what_an_archive_says_and_a_study_has_to_say_is_told(tmp_path):
         == f"2 commands D (from line {lines.index('D,10,UX,0') + 1} on), supports: name sets of nodes that are clamped"
     )
     assert damping.startswith("1 commands BETAD (from line ")
-    path.write_text(cube() + "\nTB,ANEL,3\n")
-    with pytest.raises(InputError, match=r"line \d+: gives a material by a table \(TB,ANEL\)"):
+    path.write_text(cube() + "\nTB,HYPER,3\n")
+    with pytest.raises(InputError, match=r"line \d+: gives a material by a table \(TB,HYPER\)"):
         ansys_passed_over(path)
     path.write_text(cube())
     assert ansys_passed_over(path) == ()

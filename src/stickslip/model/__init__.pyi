@@ -48,7 +48,7 @@ from .part import structure_part as structure_part
 from .readers.abaqus import read_abaqus_matrices as read_abaqus_matrices
 from .readers.ansys import read_ansys_full as read_ansys_full
 from .readers.ansys_archive import read_ansys_archive as read_ansys_archive
-from .readers.ansys_archive import read_ansys_materials as read_ansys_materials
+from .readers.ansys_materials import read_ansys_materials as read_ansys_materials
 from .readers.ansys_results import AnsysResults as AnsysResults
 from .readers.ansys_results import read_ansys_results as read_ansys_results
 from .readers.calculix import read_calculix_matrices as read_calculix_matrices

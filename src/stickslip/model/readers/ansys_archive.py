@@ -1,15 +1,13 @@
-"""Meshes and materials from ANSYS archives (``.cdb``)."""
+"""Meshes from ANSYS archives (``.cdb``)."""
 
 from pathlib import Path
 
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.errors import InputError, input_error
-from stickslip.model.fe.material import Material
+from stickslip.errors import input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
-    BEHAVIOUR,
     CONSTRAINTS,
     CUT_SHORT,
     DAMPING,
@@ -23,8 +21,9 @@ from stickslip.model.readers.ansys_blocks import (
     is_whole,
     read_blocks,
 )
+from stickslip.model.readers.ansys_materials import is_elastic_table
 from stickslip.model.readers.ansys_shapes import regular_nodes
-from stickslip.model.readers.units import Units, check_material
+from stickslip.model.readers.units import Units
 
 COUPLED = ("coupled_1", "coupled_2")
 NODES_OF_SOLID = {185: (8, 4), 186: (20,), 187: (10, 4)}  # element type -> numbers of nodes of regular shapes
@@ -104,51 +103,6 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     )
 
 
-def read_ansys_materials(
-    path: Path | str, *, units: Units | None = None, plausible: bool = True
-) -> dict[int, Material]:
-    """Read the isotropic materials of an ANSYS archive.
-
-    Parameters
-    ----------
-    path
-        The ``.cdb`` file.
-    units
-        Unit system of the model, SI by default: the file does not say.
-    plausible
-        Whether density and Young's modulus are checked for plausibility.
-
-    Returns
-    -------
-    dict
-        Material number -> material, in SI; materials without modulus, Poisson's ratio or density are left out.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, or a material is orthotropic or implausible.
-    """
-    units = Units.si() if units is None else units
-    materials = {}
-    for number, values in read_blocks(Path(path)).properties.items():
-        place = f"{path}: material {number}"
-        if any(name in values and values[name] != values.get("EX") for name in ("EY", "EZ")):
-            raise input_error(place, "is orthotropic", "Only isotropic materials are read.")
-        poisson = values.get("NUXY", values.get("PRXY"))
-        if poisson is None or not {"EX", "DENS"} <= values.keys():
-            continue
-        try:
-            material = Material(
-                young_modulus=units.stress * values["EX"], poisson_ratio=poisson, density=units.density * values["DENS"]
-            )
-        except InputError as error:
-            raise error.inside(place) from None
-        if plausible:
-            check_material(material.density, material.young_modulus, units, place)
-        materials[number] = material
-    return materials
-
-
 def ansys_passed_over(path: Path | str) -> tuple[str, ...]:
     """Return the ignored commands of an archive whose content a study must define itself: supports, damping.
 
@@ -160,10 +114,10 @@ def ansys_passed_over(path: Path | str) -> tuple[str, ...]:
     found: dict[str, list[str]] = {}
     for place, (command, *words) in read_blocks(Path(path)).commands:
         word = command.upper()
-        if word in BEHAVIOUR and words and words[0].upper()[:4] not in BEYOND_VIBRATION:
+        if word == "TB" and words and words[0].upper()[:4] not in BEYOND_VIBRATION and not is_elastic_table(words):
             raise input_error(
                 place,
-                f"gives a material by a table (TB,{words[0]}), and only isotropic elastic ones are read",
+                f"gives a material by a table (TB,{words[0]}), and of these only ANEL and ELAS (AELS, AELF) are read",
                 "Let ANSYS write its matrices (read_ansys_full), or delete the table where the model is the same without.",
             )
         if word in SUPPORTS or (word in DAMPING and any(map(_nonzero, words))):

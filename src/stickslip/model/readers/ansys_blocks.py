@@ -17,7 +17,7 @@ from stickslip.model.readers.keywords import LARGEST
 from stickslip.model.readers.text import read_text
 
 HEAD = 11  # numbers before the nodes of an element: material, type, ..., number of nodes, -, element
-TYPE, COUNT, NUMBER = 1, 8, 10  # their positions among these numbers
+MATERIAL, TYPE, ESYS, COUNT, NUMBER = 0, 1, 4, 8, 10  # their positions among these numbers
 CUT_SHORT = "The file was cut short: write or copy it again."
 WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDWRITE,DB,model,cdb."
 
@@ -25,10 +25,11 @@ WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDW
 ROTATIONS = ("OMEGA", "CMOMEGA", "CGOMGA", "DOMEGA", "CMDOMEGA", "DCGOMG")
 CONSTRAINTS = ("CE", "CP")
 OPTIONS = ("KEYO", "KEYOP", "KEYOPT")  # options of an element type; ANSYS accepts the first four letters
-BEHAVIOUR = ("TB",)  # material tables in addition to elastic properties
+BEHAVIOUR = ("TB", "TBDAT", "TBDATA")  # material tables in addition to elastic properties, which CDWRITE shortens
+SYSTEMS = ("LOCAL",)
 SUPPORTS = ("D",)
 DAMPING = ("ALPHAD", "BETAD", "DMPRAT", "DMPSTR")
-KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS, *BEHAVIOUR, *SUPPORTS, *DAMPING)
+KEPT = (*ROTATIONS, *CONSTRAINTS, *OPTIONS, *BEHAVIOUR, *SYSTEMS, *SUPPORTS, *DAMPING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Blocks:
         Material number -> property -> value.
     commands
         (place, words) of commands that change the model: rotation, coupled dofs, constraint equations, options of element
-        types (options in ``ET`` as separate ``KEYOPT``), tables of materials, supports, damping.
+        types (options in ``ET`` as separate ``KEYOPT``), tables of materials, coordinate systems, supports, damping.
     """
 
     numbers: IntArray

@@ -22,6 +22,11 @@ from stickslip.model.readers.keywords import Block, real_number, whole_number
 from stickslip.model.readers.units import Units
 
 A_LINE = 8  # constants on a line
+# places of the constants in the matrix, order 11, 22, 33, 12, 13, 23: down the columns of the upper triangle
+PLACES = {
+    "ORTHO": [*((i, j) for j in range(3) for i in range(j + 1)), (3, 3), (4, 4), (5, 5)],
+    "ANISO": [(i, j) for j in range(6) for i in range(j + 1)],
+}
 CONSTANTS = {"ISO": 2, "ENGINEERING": 9, "ORTHO": 9, "ANISO": 21}
 
 
@@ -69,7 +74,8 @@ def read_constants(block: Block) -> Constants:
     rows, temperatures, place = [], [], block.place
     for first in range(0, max(len(lines), 1), each):
         fields: list[str] = []
-        for place, own in lines[first : first + each]:
+        for where, own in lines[first : first + each]:
+            place = where
             fields += own
             if len(fields) < count:
                 fields += [""] * (-len(fields) % A_LINE)
@@ -166,13 +172,7 @@ def _row(elastic: Constants, row: tuple[float, ...], units: Units) -> tuple[floa
             raise error.inside(elastic.place) from None
         return row_of(units.stress * matrix)
     matrix = np.zeros((6, 6))
-    if elastic.kind == "ORTHO":
-        for (i, j), value in zip(
-            [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2), (3, 3), (4, 4), (5, 5)], row, strict=True
-        ):
-            matrix[i, j] = matrix[j, i] = value
-    else:
-        for (j, i), value in zip([(j, i) for j in range(6) for i in range(j + 1)], row, strict=True):
-            matrix[i, j] = matrix[j, i] = value
+    for (i, j), value in zip(PLACES[elastic.kind], row, strict=True):
+        matrix[i, j] = matrix[j, i] = value
     refuse_unstable(elastic.place, matrix)
     return row_of(units.stress * matrix, "12-13-23")

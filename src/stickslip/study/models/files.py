@@ -23,8 +23,8 @@ from stickslip.model.readers.ansys_archive import (
     ansys_passed_over,
     ansys_speed,
     read_ansys_archive,
-    read_ansys_materials,
 )
+from stickslip.model.readers.ansys_materials import ansys_cell_materials
 from stickslip.model.readers.calculix_deck import Deck, held_like_partners, read_deck
 from stickslip.model.readers.frd import read_displacement
 from stickslip.model.readers.open_model import read_structure, refuse_other_models
@@ -252,17 +252,12 @@ def _materials(deck: Deck) -> Materials:
     return deck.material
 
 
-def _from_archive(key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]) -> Part:
+def _from_archive(key: str, table: FileModel, path: Path, given: Materials | None, others: dict[str, Any]) -> Part:
     mesh = read_ansys_archive(path, units=_units(table))
     if given is None:
-        found = read_ansys_materials(path, units=_units(table), plausible=table.plausible)
-        if len(found) != 1:
-            raise input_error(
-                f"{key}.material",
-                f"is missing, and {path.name} holds {len(found)} materials",
-                "Add the table [material].",
-            )
-        given = next(iter(found.values()))
+        numbers = mesh.cell_numbers.tolist()
+        found = ansys_cell_materials(path, numbers, _units(table), plausible=table.plausible)
+        given = found if len(set(found)) > 1 else found[0]
     sectors = _sectors(key, table)
     mesh = _cyclic_pairs(key, mesh, sectors, table.axis() or Axis())
     quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
