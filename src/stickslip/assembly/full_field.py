@@ -7,12 +7,12 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import linear_side, system_of
-from stickslip.assembly.locations import AXES
+from stickslip.assembly.locations import AXES, picked
 from stickslip.assembly.model import Model
 from stickslip.assembly.part_reduction import with_ways_back
 from stickslip.assembly.response_request import asked
 from stickslip.assembly.sides.mistuned import of_all, system_of_all
-from stickslip.assembly.skin import mesh_dofs
+from stickslip.assembly.skin import mesh_motion
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness
@@ -44,8 +44,8 @@ class Nodes:
         (m, k) nodes of each cell in VTK order; None if the part has no mesh.
     cell_numbers
         (m,) numbers of the cells; None without a mesh.
-    dofs
-        (n, 3) dofs x, y, z of all parts; -1 if a node is clamped.
+    motion
+        (3 n, N) CSR from the dofs of all parts to x, y, z of the nodes; rows of clamped ones are zero.
     """
 
     part: str
@@ -53,12 +53,12 @@ class Nodes:
     points: FloatArray
     cells: IntArray | None
     cell_numbers: IntArray | None
-    dofs: IntArray
+    motion: Matrix
 
     def of(self, field: Matrix) -> Matrix:
         """Return displacements (..., n, 3) from fields (..., N) on the dofs of all parts."""
-        held = np.zeros((*field.shape[:-1], 1), dtype=field.dtype)
-        return np.concatenate([field, held], axis=-1)[..., self.dofs]
+        moved = self.motion @ field.reshape(-1, field.shape[-1]).T
+        return np.asarray(moved).T.reshape(*field.shape[:-1], -1, 3)
 
 
 def nodes_of(model: Model) -> tuple[Nodes, ...]:
@@ -79,10 +79,8 @@ def _nodes(model: Model, name: str) -> Nodes | None:
     part, first = model.parts[name], model.places.offset(name)
     mesh, table = part.mesh, part.structure.dofs
     if mesh is not None:
-        dofs = np.full((len(mesh.points), 3), -1)
-        own, nodes, components = mesh_dofs(part, mesh)
-        dofs[nodes, components] = own + first
-        return Nodes(name, mesh.numbers, mesh.points, mesh.cells, mesh.cell_numbers, dofs)
+        motion = mesh_motion(part, mesh) @ picked(model.places.own(name), model.places.n)
+        return Nodes(name, mesh.numbers, mesh.points, mesh.cells, mesh.cell_numbers, motion)
     placed = np.isin(table.component, AXES) & np.isfinite(table.position).all(axis=1)
     rows = np.flatnonzero(placed & ((table.node >= 0) | (part.body is not None)))
     if not rows.size:
@@ -90,7 +88,8 @@ def _nodes(model: Model, name: str) -> Nodes | None:
     numbers, where, place = np.unique(table.node[rows], return_index=True, return_inverse=True)
     dofs = np.full((numbers.size, 3), -1)
     dofs[place, [AXES.index(table.component[row]) for row in rows]] = rows + first
-    return Nodes(name, np.maximum(numbers, 0), table.position[rows[where]], None, None, dofs)
+    motion = picked(dofs.ravel(), model.places.n)
+    return Nodes(name, np.maximum(numbers, 0), table.position[rows[where]], None, None, motion)
 
 
 @dataclass(frozen=True, eq=False)

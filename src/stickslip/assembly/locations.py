@@ -134,6 +134,7 @@ class Places:
             found = self._node(name, head, rest) or self._dof(name, head, rest)
         if found is None:
             raise _unknown(name, head, part, place)
+        _refuse_followers(part, found, place)
         return found
 
     def _centre(self, head: str, part: Part, place: str) -> Spot:
@@ -203,6 +204,22 @@ class Places:
         return np.where(rows >= 0, rows + self.offset(head), -1)
 
 
+def _refuse_followers(part: Part, found: Spot, place: str) -> None:
+    """Refuse nodes that follow others by equations of the part's file: they are no coordinates."""
+    solid = part.solid
+    if solid is None or solid.followers is None or found.surface is None or found.surface.numbers is None:
+        return
+    moves = (np.diff(solid.followers.indptr) > 0) & ~np.isin(np.arange(solid.mesh.points.size), solid.moving)
+    after = solid.mesh.numbers[moves.reshape(-1, 3).any(axis=1)]
+    own = np.intersect1d(found.surface.numbers, after)
+    if own.size:
+        raise input_error(
+            place,
+            f"{own.size} nodes of {found.name!r} follow others by equations of the part's file, e.g. node {own[0]}",
+            "Take them out of the set, or name the nodes that they follow: an equation lets the node in the fewest node sets follow.",
+        )
+
+
 def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
     """Return the error about a name that a part does not have."""
     if name.partition(".")[2].upper() in map(str.upper, part.clamped_sets):
@@ -266,7 +283,7 @@ def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
         return none
     own, still = mesh.node_sets.get(word, NONE), mesh.node_sets.get("root", NONE)
     if part.solid is not None:
-        still = np.flatnonzero(~np.isin(mesh.numbers, part.structure.dofs.node))
+        still = np.flatnonzero(~part.solid.free)
     if not still.size or np.isin(own, still).any():
         return none
     both = facets_of(mesh, np.concatenate([own, still]))

@@ -159,6 +159,11 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
         scipy.sparse.csr_array((arm.size, arm.size)), mesh, material, solid.quadrature, np.eye(3)
     )
     load = load.ravel() + inner @ arm.ravel() if inner.nnz else load.ravel()
+    followers = None
+    if solid.followers is not None:
+        whole = scipy.sparse.kron(scipy.sparse.eye_array(len(mesh.points)), place.turn)
+        back = turned_dofs(solid.structure.dofs, place).T
+        followers = scipy.sparse.csr_array(whole @ solid.followers @ back)
     return RotatingSolid(
         structure,
         mesh,
@@ -167,5 +172,7 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
         solid.quadrature,
         solid.moving,
         solid.nodal_mass,
-        load[solid.moving],
+        load[solid.moving] if followers is None else np.asarray(followers.T @ load),
+        followers,
+        solid.small,
     )

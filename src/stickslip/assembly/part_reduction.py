@@ -330,7 +330,7 @@ def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
     if solid is not None and spin.speed != 0.0:
         mesh, material = solid.mesh, solid.material
         given = (material,) if not isinstance(material, list | tuple) else tuple(material)
-        turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
+        turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature, solid.followers)
     return content_hash("reduced", part.structure, kept, part.reduction, part.damping, turning)
 
 

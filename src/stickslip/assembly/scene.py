@@ -11,9 +11,10 @@ from stickslip.assembly.forces import Load
 from stickslip.assembly.full_field import everywhere
 from stickslip.assembly.locations import AXES, Places, picked
 from stickslip.assembly.model import Model
-from stickslip.assembly.skin import mesh_dofs
+from stickslip.assembly.skin import mesh_motion
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.fe.solid import node_dofs
 from stickslip.model.mesh.coarse import coarse_skin
 from stickslip.model.part import Part
 from stickslip.model.rigid.solids import prism
@@ -204,12 +205,9 @@ def _of_mesh(model: Model, name: str, part: Part) -> _Drawn:
     meshes = [p.mesh for p in model.parts.values() if p.mesh is not None]
     share = len(np.unique(mesh.surface)) / sum(len(np.unique(m.surface)) for m in meshes)
     kept, triangles = coarse_skin(mesh.points, mesh.surface, max(100, int(MOST_POINTS * share)))
-    own, nodes, components = mesh_dofs(part, mesh)
-    dofs = np.full((len(mesh.points), 3), -1)
-    dofs[nodes, components] = own + model.places.offset(name)
-    rows = picked(dofs[kept].ravel(), model.places.n)
-    # nodes of a deck's matrices may be condensed; nodes of a solid have all their dofs unless they are clamped
-    held = (dofs[kept] < 0).all(axis=1) & (part.solid is not None)
+    rows = mesh_motion(part, mesh)[node_dofs(kept)] @ picked(model.places.own(name), model.places.n)
+    # nodes of a deck's matrices may be condensed; nodes of a solid move unless they are clamped
+    held = np.zeros(len(kept), dtype=bool) if part.solid is None else ~part.solid.free[kept]
     return _Drawn(mesh.points[kept], triangles, "mesh", rows, mesh.points[kept][held])
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.assembly.assembled import Skin
 from stickslip.assembly.locations import AXES, Places
+from stickslip.model.fe.solid import node_dofs
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 
@@ -35,14 +37,22 @@ def on_skin(places: Places, field: Matrix) -> Matrix:
     for name, part in places.parts.items():
         if part.mesh is None:
             continue
-        out = np.zeros((field.shape[1], len(part.mesh.points), 3), dtype=field.dtype)
-        dofs, nodes, components = mesh_dofs(part, part.mesh)
-        out[:, nodes, components] = field[places.offset(name) + dofs].T
-        found.append(out[:, np.unique(part.mesh.surface)])
+        rows = node_dofs(np.unique(part.mesh.surface))
+        moved = mesh_motion(part, part.mesh)[rows] @ field[places.own(name)]
+        found.append(np.asarray(moved).T.reshape(field.shape[1], -1, 3))
     return np.concatenate(found, axis=1)
 
 
-def mesh_dofs(part: Part, mesh: SolidMesh) -> tuple[IntArray, IntArray, IntArray]:
+def mesh_motion(part: Part, mesh: SolidMesh) -> Matrix:
+    """Return the CSR matrix (3 n, m) from a part's dofs to the x, y, z of the nodes of its mesh; rows of held ones are zero."""
+    if part.solid is not None:
+        return part.solid.onto
+    dofs, nodes, components = _mesh_dofs(part, mesh)
+    entries = (np.ones(dofs.size), (3 * nodes + components, dofs))
+    return scipy.sparse.csr_array(entries, shape=(3 * len(mesh.points), part.structure.n))
+
+
+def _mesh_dofs(part: Part, mesh: SolidMesh) -> tuple[IntArray, IntArray, IntArray]:
     """Return a part's dofs that are mesh displacements, their nodes (indices), and their components (0, 1, 2)."""
     table = part.structure.dofs
     order = np.argsort(mesh.numbers, kind="stable")
@@ -59,7 +69,7 @@ def _cut(part: Part, mesh: SolidMesh, skin: IntArray) -> IntArray:
     cut = np.zeros(len(skin), dtype=np.int64)
     if part.sectors == 1:
         return cut
-    dofs, nodes, _ = mesh_dofs(part, mesh)
+    dofs, nodes, _ = _mesh_dofs(part, mesh)
     held = np.ones(len(mesh.points), dtype=bool)
     held[nodes] = False
     for face in part.faces:

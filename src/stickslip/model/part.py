@@ -11,6 +11,7 @@ from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.fe.elements import EXACT, Rules
+from stickslip.model.fe.links import Links
 from stickslip.model.fe.material import Materials
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.matrices_at_speeds import SpeedMatrices
@@ -247,18 +248,19 @@ def solid_part(
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
+    links: Links | None = None,
     **others: Any,
 ) -> Part:
     """Return a part of finite elements.
 
     Parameters
     ----------
-    mesh, material, axis, clamped, held, quadrature
+    mesh, material, axis, clamped, held, quadrature, links
         As in `rotating_solid`.
     **others
         Further fields of `Part`: ``sectors``, ``faces``, ``reduction``, ``damping``, ``warnings``.
     """
-    solid = rotating_solid(mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature)
+    solid = rotating_solid(mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature, links=links)
     return Part(structure=solid.structure, mesh=mesh, solid=solid, axis=axis, **others)
 
 

@@ -20,6 +20,7 @@ from stickslip.model.fe.cell_laws import cell_laws, laws_of_group
 from stickslip.model.fe.cell_matrices import hourglass_stiffness, inertia
 from stickslip.model.fe.elements import EXACT, CellGroup, NodeBlocks, Rules, cell_groups
 from stickslip.model.fe.factorisation import factorise
+from stickslip.model.fe.links import Links
 from stickslip.model.fe.material import Materials
 from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms
 from stickslip.model.fe.solid import integrate, node_dofs, support
@@ -72,9 +73,13 @@ class RotatingSolid:
     moving
         (n,) position of each dof among the x, y, z of all nodes, node-major.
     nodal_mass
-        (nodes, nodes) ``∫ ρ N_i N_j`` in kg, without bricks that have incompatible modes.
+        (nodes, nodes) ``∫ ρ N_i N_j`` in kg, without bricks that have incompatible modes; with point masses.
     centrifugal
         (n,) centrifugal load at 1 rad/s, in N s².
+    followers
+        (3 nodes, n) CSR from the dofs to the x, y, z of all nodes, some of which follow others by equations; None if none does.
+    small
+        As in `Links`.
     """
 
     structure: Structure
@@ -85,6 +90,8 @@ class RotatingSolid:
     moving: IntArray
     nodal_mass: Matrix
     centrifugal: FloatArray
+    followers: Matrix | None = None
+    small: str = ""
     _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
     _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(default_factory=dict, init=False, repr=False)
 
@@ -114,24 +121,33 @@ class RotatingSolid:
         parts = (hourglass_stiffness(group, laws_of_group(laws, group.mesh, group.rows)) for group in groups)
         return self._of_dofs(sum(parts))
 
-    @property
+    @cached_property
+    def onto(self) -> Matrix:
+        """(3 nodes, n) CSR from the dofs to the x, y, z of all nodes; rows of supported components are zero."""
+        if self.followers is not None:
+            return self.followers
+        n = self.moving.size
+        entries = (np.ones(n), (self.moving, np.arange(n)))
+        return scipy.sparse.csr_array(entries, shape=(self.mesh.points.size, n))
+
+    @cached_property
     def free(self) -> BoolArray:
         """(nodes,) whether a node can move."""
-        free = np.zeros(len(self.mesh.points), dtype=bool)
-        free[self.moving // 3] = True
-        return free
+        return np.asarray((np.diff(self.onto.indptr) > 0).reshape(-1, 3).any(axis=1))
 
     def at_nodes(self, vector: FloatArray) -> FloatArray:
         """Return a vector (n,) as (nodes, 3), with zeros at supported components."""
-        full = np.zeros(self.mesh.points.size, dtype=vector.dtype)
-        full[self.moving] = vector
-        return full.reshape(-1, 3)
+        return np.asarray(self.onto @ vector).reshape(-1, 3)
 
     def _of_dofs(self, matrix: Matrix) -> Matrix:
-        """Remove supported components from a matrix of the x, y, z of all nodes or of all free nodes."""
-        index = self.moving
+        """Return a matrix of the x, y, z of all nodes or of all free nodes on the dofs."""
+        index, onto = self.moving, self.followers
         if matrix.shape[0] < self.mesh.points.size:
-            index = np.searchsorted(node_dofs(np.flatnonzero(self.free)), index)
+            rows = node_dofs(np.flatnonzero(self.free))
+            index = np.searchsorted(rows, index)
+            onto = None if onto is None else onto[rows]
+        if onto is not None:
+            return scipy.sparse.csr_array(onto.T @ matrix @ onto)
         whole = len(index) == matrix.shape[0]
         return matrix if whole else scipy.sparse.csr_array(matrix[index][:, index])
 
@@ -164,7 +180,7 @@ class RotatingSolid:
         StickslipError
             If Newton's method finds no equilibrium.
         """
-        _check_speed(speed)
+        self._check_speed(speed)
         linear = speed**2 * self._unit_displacement(tie)
         return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
 
@@ -186,6 +202,7 @@ class RotatingSolid:
                 f"tangent {tangent!r} is no polynomial of the speed",
                 "Use 'consistent' or 'textbook', or at_speed.",
             )
+        self._refuse_small()
         key = (_content(tie) if unit is None else sha256(unit.tobytes()).hexdigest(), tangent)
         if key not in self._polynomials:
             moved = self._unit_displacement(tie) if unit is None else unit
@@ -218,11 +235,13 @@ class RotatingSolid:
         unit
             (n,) linear static displacement at 1 rad/s in m s², if other bodies affect it; None: computed from `tie`.
         """
-        _check_speed(speed)
+        self._check_speed(speed)
         if tangent not in TANGENTS:
             raise input_error(
                 "RotatingSolid.at_speed", f"there is no tangent {tangent!r}", did_you_mean(tangent, list(TANGENTS))
             )
+        if self.small:  # no speed
+            return self.structure
         if tangent == "nonlinear":
             start = speed**2 * self._unit_displacement(tie)
             stiffness = self._equilibrium(speed, tie, start)[1]
@@ -261,7 +280,7 @@ class RotatingSolid:
         found = np.zeros_like(where)
         for group in self.cell_groups:
             found += internal_force(group.mesh, self._materials(group), group.strain, where)
-        force: FloatArray = found.ravel()[self.moving]
+        force: FloatArray = np.asarray(self.onto.T @ found.ravel())
         return force if self.hourglass is None else force + self.hourglass @ displacement
 
     def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
@@ -295,6 +314,21 @@ class RotatingSolid:
             "The solid may be unstable at this speed: try a lower one, and look at displacement(speed)."
         )
 
+    def _check_speed(self, speed: float) -> None:
+        if not math.isfinite(speed):
+            raise input_error("speed", f"must be a number in rad/s, got {speed}", "Give rad/s.")
+        if speed != 0.0:
+            self._refuse_small()
+
+    def _refuse_small(self) -> None:
+        if self.small:
+            raise input_error(
+                self.small,
+                "right for small rotations alone, but steady rotation loads it, and then it changes the stiffness at second order, as "
+                "the weight of a pendulum does",
+                "Compute it at rest, or model that body by elements.",
+            )
+
     def _assemble_polynomial(self, unit: FloatArray, tangent: Tangent) -> SpeedPolynomial:
         terms = self._terms(unit)
         square = terms.geometric - self.spin_softening
@@ -311,12 +345,13 @@ def rotating_solid(
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
+    links: Links | None = None,
 ) -> RotatingSolid:
     """Assemble a solid that rotates about an axis together with its supports.
 
     Parameters
     ----------
-    mesh, material, clamped, held, quadrature
+    mesh, material, clamped, held, quadrature, links
         As in `assemble_solid`.
     axis
         Axis of rotation.
@@ -332,13 +367,15 @@ def rotating_solid(
     InputError
         As in `assemble_solid`.
     """
-    mass, stiffness = integrate(mesh, material, quadrature)
-    structure, moving = support(mesh, mass, stiffness, clamped, held)
+    mass, stiffness = integrate(mesh, material, quadrature, links)
+    structure, moving, onto = support(mesh, mass, stiffness, clamped, held, links)
     # positions are interpolated like displacements, so the mass matrix integrates the load exactly
-    load = (mass @ axis.arm(mesh.points).ravel())[moving]
+    load = mass @ axis.arm(mesh.points).ravel()
     own = with_inner_inertia(mass, mesh, material, quadrature, -np.eye(3))
     nodal_mass = scipy.sparse.csr_array(own[::3][:, ::3])
-    return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load)
+    load = load[moving] if onto is None else np.asarray(onto.T @ load)
+    small = "" if links is None else links.small
+    return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load, onto, small)
 
 
 def with_inner_inertia(
@@ -381,8 +418,3 @@ def _solve(stiffness: Matrix, load: FloatArray, tie: Matrix | None) -> FloatArra
 
 def _on_tie(force: FloatArray, tie: Matrix | None) -> FloatArray:
     return force if tie is None else np.asarray(tie.T @ force)
-
-
-def _check_speed(speed: float) -> None:
-    if not math.isfinite(speed):
-        raise input_error("speed", f"must be a number in rad/s, got {speed}", "Give rad/s.")

@@ -23,6 +23,7 @@ from stickslip.model.fe.elements import (
     library,
     library_element,
 )
+from stickslip.model.fe.links import Links, eliminate
 from stickslip.model.fe.material import AnyMaterial, Material, Materials
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.structure import Structure, nodal_dofs
@@ -37,6 +38,7 @@ def assemble_solid(
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
+    links: Links | None = None,
 ) -> Structure:
     """Assemble mass and stiffness, with the nodes of the sets `clamped` removed.
 
@@ -52,11 +54,13 @@ def assemble_solid(
         (nodes, 3) further supported components x, y, z.
     quadrature
         Quadrature, or a list of m, one for each cell; the default integrates straight-edged cells exactly.
+    links
+        Equations between nodes, point masses, springs and dashpots; None: none.
 
     Returns
     -------
     Structure
-        Sparse, undamped; `Dofs.node` holds the mesh's node numbers. Each other node set becomes a set of dofs,
+        Sparse, undamped but for dashpots; `Dofs.node` holds the mesh's node numbers. Each other node set becomes a set of dofs,
         node-major (x, y, z) without supported components; ``cyclic_low`` and ``cyclic_high`` lose their clamped nodes.
 
     Raises
@@ -65,8 +69,8 @@ def assemble_solid(
         If the mesh has nodes without elements or cells inside out, neighbours that do not share their mid-side nodes,
         `clamped` names an unknown set, or another set has clamped nodes.
     """
-    mass, stiffness = integrate(mesh, material, quadrature)
-    return support(mesh, mass, stiffness, clamped, held)[0]
+    mass, stiffness = integrate(mesh, material, quadrature, links)
+    return support(mesh, mass, stiffness, clamped, held, links)[0]
 
 
 def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
@@ -83,14 +87,20 @@ def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
 
 
 def support(
-    mesh: SolidMesh, mass: Matrix, stiffness: Matrix, clamped: tuple[str, ...], held: BoolArray | None
-) -> tuple[Structure, IntArray]:
-    """Remove supported components from the matrices of a free body.
+    mesh: SolidMesh,
+    mass: Matrix,
+    stiffness: Matrix,
+    clamped: tuple[str, ...],
+    held: BoolArray | None,
+    links: Links | None = None,
+) -> tuple[Structure, IntArray, Matrix | None]:
+    """Remove supported components, and those that follow others by links, from the matrices of a free body.
 
     Returns
     -------
-    tuple[Structure, IntArray]
-        The structure, and the index (n,) of each of its dofs in the free body.
+    tuple[Structure, IntArray, Matrix or None]
+        The structure, the index (n,) of each of its dofs in the free body, and the CSR matrix (3 nodes, n) from them to all; None
+        if no dof follows others.
     """
     still = _clamped_nodes(mesh, clamped)
     fixed = np.repeat(still[:, None], 3, axis=1)
@@ -98,7 +108,16 @@ def support(
         if held.shape != fixed.shape:
             raise input_error("held", f"has shape {held.shape} for {len(still)} nodes", "Give x, y, z of each node.")
         fixed = fixed | held
-    moving = np.flatnonzero(~fixed.ravel())
+    moving, onto = np.flatnonzero(~fixed.ravel()), None
+    damping = scipy.sparse.csr_array(mass.shape)
+    if links is not None:
+        damping = damping + links.dashpots
+        members = np.concatenate([np.zeros(0, np.int64), *(np.unique(own) for own in mesh.node_sets.values())])
+        counts = np.bincount(members, minlength=len(still))
+        loose = np.setdiff1d(np.arange(len(still)), mesh.cells)  # as reference nodes, which loads act on
+        counts[loose] += len(mesh.node_sets) + 1
+        found = eliminate(links, fixed.ravel() | _idle(mass, stiffness, links), counts)
+        moving, onto = found.moving, found.onto
     new = np.full(fixed.size, -1)
     new[moving] = np.arange(len(moving))
     sets = {}
@@ -113,10 +132,18 @@ def support(
             )
         index = new[node_dofs(members)]
         sets[name] = index[index >= 0]
-    mass, stiffness = mass[moving][:, moving], stiffness[moving][:, moving]
-    damping = scipy.sparse.csr_array(mass.shape)
+    own = [
+        matrix[moving][:, moving] if onto is None else scipy.sparse.csr_array(onto.T @ matrix @ onto)
+        for matrix in (mass, damping, stiffness)
+    ]
     table = nodal_dofs(mesh.points, mesh.numbers).take(moving)
-    return Structure(mass, damping, stiffness, table, sets), moving
+    return Structure(own[0], own[1], own[2], table, sets), moving, onto
+
+
+def _idle(mass: Matrix, stiffness: Matrix, links: Links) -> BoolArray:
+    """Return a mask (3 n,) of components of nodes without cells that have neither mass nor stiffness nor an equation."""
+    used = abs(links.equations[:, : mass.shape[0]]).sum(axis=0)
+    return np.asarray((mass.diagonal() == 0) & (stiffness.diagonal() == 0) & (used == 0))
 
 
 def node_dofs(nodes: IntArray) -> IntArray:
@@ -124,16 +151,27 @@ def node_dofs(nodes: IntArray) -> IntArray:
     return np.asarray((3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
 
-def integrate(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[Matrix, Matrix]:
-    """Return mass and stiffness of the free body, dofs node-major in the mesh's own order."""
-    check_nodes(mesh)
+def integrate(
+    mesh: SolidMesh, material: Materials, quadrature: Rules, links: Links | None = None
+) -> tuple[Matrix, Matrix]:
+    """Return mass and stiffness of the free body with its links, dofs node-major in the mesh's own order."""
+    check_nodes(mesh, () if links is None else links.nodes)
+    mass, stiffness = _integrate_cells(mesh, material, quadrature)
+    if links is None:
+        return mass, stiffness
+    points = scipy.sparse.diags_array(np.repeat(links.mass, 3))
+    return scipy.sparse.csr_array(mass + points), scipy.sparse.csr_array(stiffness + links.springs)
+
+
+def _integrate_cells(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[Matrix, Matrix]:
     groups = cell_groups(mesh, quadrature)
     for group in groups:
         for degree in {group.rule.stiffness: group.strain, group.rule.mass: group.inertia}.values():
             check_jacobians(group.mesh, degree)
     check_shared(mesh)
+    everywhere = len(np.unique(mesh.cells[mesh.cells >= 0])) == len(mesh.points)
     laws = cell_laws(mesh, material)
-    if len(laws.each) == 1 and len(groups) == 1:
+    if len(laws.each) == 1 and len(groups) == 1 and everywhere:
         return _integrate(groups[0], laws.each[0])
     n = 3 * len(mesh.points)
     mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
@@ -185,9 +223,9 @@ def _integrate(group: CellGroup, material: AnyMaterial) -> tuple[Matrix, Matrix]
     return mass, scipy.sparse.csr_array((stiffness + stiffness.T) / 2)
 
 
-def check_nodes(mesh: SolidMesh) -> None:
-    """Refuse nodes that belong to no cell."""
-    orphans = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
+def check_nodes(mesh: SolidMesh, linked: IntArray | tuple[()] = ()) -> None:
+    """Refuse nodes that belong neither to a cell nor to the `linked` ones."""
+    orphans = np.setdiff1d(np.setdiff1d(np.arange(len(mesh.points)), mesh.cells), linked)
     if orphans.size:
         raise input_error(
             "mesh", f"{orphans.size} nodes belong to no element, e.g. {mesh.numbers[orphans[0]]}", "Remove them."

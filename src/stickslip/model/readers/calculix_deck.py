@@ -7,24 +7,27 @@ materials, supports, ties and steps; and with only NumPy and SciPy installed it 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.elements import EXACT, Quadrature, Rules
+from stickslip.model.fe.links import Links, eliminate
 from stickslip.model.fe.material import AnyMaterial
-from stickslip.model.fe.solid import integrate, node_dofs
+from stickslip.model.fe.solid import integrate, support
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
+from stickslip.model.readers.deck_links import links_of_mesh, read_coupling
 from stickslip.model.readers.deck_materials import material_of, read_orientation
 from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, keyword_blocks, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
-from stickslip.model.structure import Structure, nodal_dofs
+from stickslip.model.structure import Structure
 
 # corners of the faces S1, S2, …, counted from 0, by number of corners of a cell
 FACES: dict[int, tuple[tuple[int, ...], ...]] = {
@@ -36,7 +39,7 @@ FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 
 
 def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
-    """Add the faces of the cyclic tie to the model; refuse other ties, and several instances.
+    """Add the faces of the cyclic ties to the model; refuse other ties, and several instances.
 
     Parameters
     ----------
@@ -68,17 +71,29 @@ def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) ->
             raise input_error(block.place, "needs one line with two surfaces", "Add it.")
         place, fields = rows[0]
         low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
-        if model.tie is not None:
-            raise input_error(block.place, "is a second cyclic tie", "Tie the faces of one sector.")
-        model.tie = (low, high)
+        model.ties.append((low, high))
         if block.parameters.get("POSITION TOLERANCE"):
-            model.reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
+            reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
+            model.reach = max(model.reach, reach)
         if model.sectors is None:
             raise input_error(
                 block.place,
                 "is cyclic, but nothing says how many sectors there are",
                 "Add *CYCLIC SYMMETRY MODEL, N=….",
             )
+
+
+def couple(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
+    """Add the couplings of surfaces with reference nodes to the links of the model."""
+    passed = passed_over(ignore)
+    surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
+    for block, below in pairwise([*blocks, Block("END", {}, blocks[-1].path, 0)]):
+        if block.keyword != "COUPLING" or "COUPLING" in passed:
+            continue
+        if below.keyword != "KINEMATIC":
+            raise unread(block, "a *COUPLING without *KINEMATIC in the next line ties nodes and is not read")
+        surface = _surface_nodes(model, surfaces, block.parameter("SURFACE").upper(), block.place)
+        read_coupling(model.links, block, below, partial(nodes_named, model), model.nodes, surface)
 
 
 def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
@@ -154,6 +169,10 @@ class Deck:
         Names of the deck's sets whose nodes are all clamped, which are therefore missing in the mesh.
     of_abaqus
         Whether the deck has keywords that Abaqus alone has (``*PART``, ``*ASSEMBLY``, ``*PREPRINT``).
+    links
+        Equations, point masses, springs and dashpots; None without any.
+    told
+        What the equations do beyond their words, with their lines: those that follow from others, those that hold a dof.
     """
 
     mesh: SolidMesh
@@ -167,6 +186,8 @@ class Deck:
     ignored: tuple[str, ...]
     clamped_sets: tuple[str, ...] = ()
     of_abaqus: bool = False
+    links: Links | None = None
+    told: tuple[str, ...] = ()
 
     @property
     def element_type(self) -> str:
@@ -223,7 +244,6 @@ QUADRATURES = {
 # bricks that are other elements than the plain one. C3D8I with exact mass, and distorted bricks pass the patch test; C3D8R has its
 # mass at one point, too.
 EXACT_BRICKS = {"C3D8I": Quadrature(stiffness=3, mass=4, inner="mean"), "C3D8R": QUADRATURES["C3D8R"]}
-ABAQUS_WORDS = {"PART", "ASSEMBLY", "PREPRINT"}  # keywords that CalculiX does not have
 
 
 def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = (), plausible: bool = True) -> Deck:
@@ -255,17 +275,24 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     blocks = keyword_blocks(path)
     model = interpret(blocks, block_nodes(blocks, path), ignore)
     tie_faces(model, blocks, ignore)
+    couple(model, blocks, ignore)
     materials = _materials(model, units, plausible)
     mesh, keep = _mesh(model, units)
     held: BoolArray = _held(model)[keep]
     axis = _axis(model, units)
+    links = links_of_mesh(model.links, mesh.numbers, units)
     sets = {name: _index(mesh, nodes) for name, nodes in model.nodes.node_sets.items()}
-    if model.tie is not None and model.sectors:
-        faces = _index(mesh, model.tie[0]), _index(mesh, model.tie[1])
-        faces = _oriented(mesh.points, faces, axis, model.sectors)
+    if model.ties and model.sectors:
+        pairs = [(_index(mesh, low), _index(mesh, high)) for low, high in model.ties]
+        pairs = [_oriented(mesh.points, pair, axis, model.sectors) for pair in pairs]
+        faces = (
+            unique_in_order(np.concatenate([p[0] for p in pairs])),
+            unique_in_order(np.concatenate([p[1] for p in pairs])),
+        )
         mesh = _met(mesh, faces, axis, 2 * math.pi / model.sectors, units.length * model.reach)
         held = _held_by_tie(mesh, held, faces, axis, 2 * math.pi / model.sectors)
         sets |= {"cyclic_low": faces[0], "cyclic_high": faces[1]}
+        links = None if links is None else replace(links, lasting=np.concatenate(faces))
     root: BoolArray = held.min(axis=1)
     free_sets = {name: nodes[~root[nodes]] for name, nodes in sets.items()}
     node_sets = {name: nodes for name, nodes in free_sets.items() if nodes.size}
@@ -286,8 +313,23 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
         model.sectors,
         tuple(model.ignored),
         tuple(name for name, nodes in free_sets.items() if not nodes.size),
-        any(block.keyword in ABAQUS_WORDS for block in blocks),
+        model.of_abaqus,
+        links,
+        () if links is None else _of_equations(links, held),
     )
+
+
+def _of_equations(links: Links, held: BoolArray) -> tuple[str, ...]:
+    """Return which equations follow from others, and which hold a dof, for the user."""
+    found = eliminate(links, held.ravel(), np.zeros(len(held), dtype=np.int64))
+    told = []
+    if found.surplus:
+        told.append(f"{len(found.surplus)} equations follow from others and the supports ({found.surplus[0]})")
+    if found.holding:
+        told.append(
+            f"{len(found.holding)} equations hold a node, together with others and the supports ({found.holding[0]})"
+        )
+    return tuple(told)
 
 
 def assemble_deck(deck: Deck) -> Structure:
@@ -303,23 +345,9 @@ def assemble_deck(deck: Deck) -> Structure:
     Structure
         Sparse, undamped. Each node set becomes a set of dofs, without supported ones.
     """
-    mass, stiffness = integrate(deck.mesh, [deck.materials[name] for name in deck.cell_material], deck.quadrature)
-    n = mass.shape[0]
-    free = np.flatnonzero(~deck.held.ravel())
-    new = np.full(n, -1)
-    new[free] = np.arange(len(free))
-    sets = {}
-    for name, members in deck.mesh.node_sets.items():
-        index = new[node_dofs(members)]
-        if name != "root":
-            sets[name] = index[index >= 0]
-    return Structure(
-        mass.tocsr()[free][:, free],
-        scipy.sparse.csr_array((len(free), len(free))),
-        stiffness.tocsr()[free][:, free],
-        nodal_dofs(deck.mesh.points, deck.mesh.numbers).take(free),
-        sets,
-    )
+    materials = [deck.materials[name] for name in deck.cell_material]
+    mass, stiffness = integrate(deck.mesh, materials, deck.quadrature, deck.links)
+    return support(deck.mesh, mass, stiffness, ("root",), deck.held, deck.links)[0]
 
 
 def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, AnyMaterial]:
@@ -377,9 +405,9 @@ def _mesh(model: DeckModel, units: Units) -> tuple[SolidMesh, IntArray]:
     """Return the mesh without sets, and the rows of the nodes that it kept."""
     own = model.cells[:, 1:] >= 0
     rows = model.nodes.index(model.cells[:, 1:][own])
-    kept, nodes = np.unique(rows, return_inverse=True)
+    kept = np.union1d(rows, model.nodes.index(model.links.nodes))
     cells = np.full(own.shape, -1)
-    cells[own] = nodes
+    cells[own] = np.searchsorted(kept, rows)
     if len(kept) < len(model.nodes.numbers):
         model.ignored.append(f"{len(model.nodes.numbers) - len(kept)} nodes that belong to no cell")
     mesh = SolidMesh(

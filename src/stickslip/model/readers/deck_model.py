@@ -2,13 +2,24 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.readers.deck_links import (
+    POINT_KINDS,
+    DeckLinks,
+    read_equation,
+    read_mpc,
+    read_point_property,
+    read_rigid_body,
+    read_transform,
+)
 from stickslip.model.readers.deck_materials import Constants, read_constants
 from stickslip.model.readers.deck_words import (
+    ABAQUS_WORDS,
     DAMPING,
     PARAMETERS,
     PASSING_CONDITIONS,
@@ -55,8 +66,11 @@ class DeckModel:
     speed_squares: list[float] = field(default_factory=list)
     axes: list[tuple[str, list[float], list[float]]] = field(default_factory=list)  # place, origin, direction
     sectors: int | None = None
-    tie: tuple[IntArray, IntArray] | None = None  # nodes of the dependent and the independent face
+    repeated: list[tuple[str, str]] = field(default_factory=list)  # place and elements of each cyclic model
+    ties: list[tuple[IntArray, IntArray]] = field(default_factory=list)  # nodes of dependent and independent faces
     reach: float = 0.0  # distance within which nodes of the tied faces meet
+    links: DeckLinks = field(default_factory=DeckLinks)
+    of_abaqus: bool = False  # whether the deck has keywords that Abaqus alone has
     ignored: list[str] = field(default_factory=list)
 
 
@@ -77,7 +91,7 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
     InputError
         If something is missing or wrong, or changes the matrices in an unsupported way.
     """
-    model = DeckModel(nodes)
+    model = DeckModel(nodes, of_abaqus=any(block.keyword in ABAQUS_WORDS for block in blocks))
     passed = passed_over(ignore)
     _cells(model, blocks, passed)
     _nodes_of_elements(model, blocks)
@@ -95,11 +109,29 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
             elif word in _ACTIONS:
                 _ACTIONS[word](model, block)
         elif word in TOLD:
-            if any(block.rows()):  # a step that only removes earlier loads has no rows
-                model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
+            _tell(model, block)
         elif word not in SILENT:
             raise _refused(block)
+    _rotation_nodes(model)
+    _check_repeated(model)
     return model
+
+
+def _rotation_nodes(model: DeckModel) -> None:
+    """Take supports of the rotation nodes of rigid bodies as supports of the rotations of their reference nodes."""
+    for direction, component in enumerate("xyz", 4):
+        for nodes in model.fixed[component]:
+            own = [int(node) for node in nodes if int(node) in model.links.rotation_nodes]
+            model.links.held_angles |= {(model.links.rotation_nodes[node], direction) for node in own}
+
+
+def _tell(model: DeckModel, block: Block) -> None:
+    """List a keyword that does not change the structure; a step that only removes earlier loads has no rows."""
+    place = f"*{block.keyword} ({block.path.name}: line {block.line})"
+    if block.keyword == "CONTACT PAIR":
+        model.ignored.append(f"{place}: its surfaces are free until a study couples them")
+    elif any(block.rows()):
+        model.ignored.append(place)
 
 
 def passed_over(ignore: tuple[str, ...]) -> set[str]:
@@ -147,13 +179,19 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
             continue
         block.check_parameters()
         kind = block.parameter("TYPE").upper()
+        if kind in POINT_KINDS:
+            rows = np.array(list(_connectivity(model, block, POINT_KINDS[kind])), dtype=np.int64)
+            model.links.elements |= {int(row[0]): (kind, row[1:].tolist()) for row in rows}
+            if "ELSET" in block.parameters and len(rows):
+                named.setdefault(block.parameters["ELSET"].upper(), []).append(rows[:, 0])
+            continue
         if kind not in NODES_OF and "ELEMENT" in passed:
             model.ignored.append(f"elements {kind} ({block.path.name}: line {block.line}), as asked")
             continue
         if kind not in NODES_OF:
             raise unread(block, f"elements of type {kind} are not read")
         count = NODES_OF[kind]
-        rows = np.array(list(_connectivity(block, count)), dtype=np.int64).reshape(-1, count + 1)
+        rows = np.array(list(_connectivity(model, block, count)), dtype=np.int64).reshape(-1, count + 1)
         parts.append(rows)
         kinds += [kind] * len(rows)
         if "ELSET" in block.parameters:
@@ -163,12 +201,11 @@ def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
     widest = max(rows.shape[1] for rows in parts)
     model.cells = np.vstack([np.pad(rows, ((0, 0), (0, widest - rows.shape[1])), constant_values=-1) for rows in parts])
     model.kinds = tuple(kinds)
-    if len(np.unique(model.cells[:, 0])) < len(model.cells):
-        number, times = np.unique(model.cells[:, 0], return_counts=True)
+    numbers = np.concatenate([model.cells[:, 0], np.array([*model.links.elements], dtype=np.int64)])
+    if len(np.unique(numbers)) < len(numbers):
+        number, times = np.unique(numbers, return_counts=True)
         raise input_error(model.nodes.place, f"defines element {number[times > 1][0]} twice", "Give it once.")
-    model.element_sets = members(
-        blocks, "ELSET", model.cells[:, 0], {name: np.concatenate(p) for name, p in named.items()}
-    )
+    model.element_sets = members(blocks, "ELSET", numbers, {name: np.concatenate(p) for name, p in named.items()})
 
 
 def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
@@ -186,19 +223,23 @@ def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
     model.nodes = replace(model.nodes, node_sets=sets)
 
 
-def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
-    """Yield number and nodes of each element; long elements continue on the next lines."""
+def _connectivity(model: DeckModel, block: Block, count: int) -> Iterator[list[int]]:
+    """Yield number and nodes of each element; long elements continue on the next lines, surplus nodes of a line are passed over."""
     row: list[int] = []
-    place = block.place
+    place, surplus = block.place, 0
     for place, fields in block.rows():
-        row += [whole_number(text, place, "node") for text in fields]
-        if len(row) > count + 1:
-            raise input_error(place, f"an element has {len(row) - 1} nodes, not {count}", "Check TYPE and lines.")
-        if len(row) == count + 1:
-            yield row
+        row += [whole_number(text, place, "node") for text in fields if text]
+        if len(row) > count:
+            surplus += len(row) > count + 1
+            yield row[: count + 1]
             row = []
     if row:
         raise input_error(place, f"the last element has {len(row) - 1} nodes of {count}", "The file is cut short.")
+    if surplus:
+        kind = block.parameter("TYPE").upper()
+        model.ignored.append(
+            f"the surplus nodes of {surplus} elements {kind}, which have {count} ({block.path.name}: line {block.line})"
+        )
 
 
 def _material(model: DeckModel, block: Block, material: str) -> None:
@@ -235,6 +276,9 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
     return number
 
 
+OTHER_FIELDS = (0, 8, 11)  # directions of temperature and electric potential
+
+
 def _boundary(model: DeckModel, block: Block) -> None:
     """Read supports: ``node or set, first direction, last direction, value``, or a type such as ``ENCASTRE``."""
     words = {"ENCASTRE": (1, 6), "PINNED": (1, 3)}
@@ -242,6 +286,7 @@ def _boundary(model: DeckModel, block: Block) -> None:
         raise unread(block, f"TYPE={block.parameters['TYPE']} is not read")
     if _anew(block):
         model.fixed = {"x": [], "y": [], "z": []}
+        model.links.supports, model.links.held_angles = [], set()
     for place, fields in block.rows():
         nodes = nodes_named(model, fields[0], place)
         if len(fields) > 1 and fields[1].upper() in words:
@@ -253,12 +298,27 @@ def _boundary(model: DeckModel, block: Block) -> None:
             last = whole_number(fields[2] or str(first), place, "direction") if len(fields) > 2 else first
         value = real_number(fields[3], place, "value") if len(fields) > 3 else 0.0
         if value:
-            raise unread(block, f"a prescribed displacement of {value:g} is not read")
+            model.ignored.append(f"the prescribed displacement of {value:g} ({place}): its nodes are held at 0")
+        if first == last and first in OTHER_FIELDS:
+            model.ignored.append(f"the boundary condition of direction {first} ({place}), which is no displacement")
+            continue
         if not 1 <= first <= last:
             raise input_error(place, f"directions {first} to {last}", "They count from 1 to 3.")
-        for direction, component in enumerate("xyz", 1):
-            if first <= direction <= last:
-                model.fixed[component].append(nodes)
+        _hold(model, nodes, first, last, place)
+
+
+def _hold(model: DeckModel, nodes: IntArray, first: int, last: int, place: str) -> None:
+    """Hold directions of nodes, along their own axes where ``*TRANSFORM`` turns these."""
+    links = model.links
+    whole = first == 1 and last >= 3
+    turned = [] if whole else [int(node) for node in nodes if int(node) in links.turns]
+    plain = nodes[~np.isin(nodes, turned)] if turned else nodes
+    for direction in range(first, min(last, 6) + 1):
+        if direction <= 3:
+            model.fixed["xyz"[direction - 1]].append(plain)
+            links.supports += [(place, links.along(node, direction)) for node in turned]
+        else:
+            links.held_angles |= {(int(node), direction) for node in nodes}
 
 
 def _anew(block: Block) -> bool:
@@ -299,6 +359,20 @@ def _distributed_load(model: DeckModel, block: Block) -> None:
         model.axes.append((place, numbers[1:4], numbers[4:7]))
 
 
+def _check_repeated(model: DeckModel) -> None:
+    """Refuse cyclic models whose sets together lack some of the elements."""
+    names = [name for _, name in model.repeated]
+    if not names or "" in names:
+        return
+    own = np.concatenate([_elements_named(model, name, place) for place, name in model.repeated])
+    if not np.isin(model.cells[:, 0], own).all():
+        raise input_error(
+            model.repeated[-1][0],
+            f"repeats {' and '.join(map(repr, names))}, which lack some of the elements",
+            "Name sets that hold all elements together, or leave ELSET out.",
+        )
+
+
 def _whole_model(model: DeckModel, name: str, place: str, what: str) -> None:
     """Refuse a set that lacks some of the elements."""
     inside = model.element_sets.get(name.upper(), np.empty(0, dtype=np.int64))
@@ -327,8 +401,7 @@ def _cyclic_model(model: DeckModel, block: Block) -> None:
     model.sectors = whole_number(block.parameter("N"), block.place, "number of sectors N")
     if before not in (None, model.sectors):
         raise input_error(block.place, f"N={model.sectors} after N={before}", "Give one.")
-    if "ELSET" in block.parameters:
-        _whole_model(model, block.parameters["ELSET"], block.place, "repeats")
+    model.repeated.append((block.place, block.parameters.get("ELSET", "").upper()))
     if model.sectors < 1:
         raise input_error(block.place, f"N={model.sectors}", "Give the number of sectors.")
     rows = list(block.rows())
@@ -340,7 +413,45 @@ def _cyclic_model(model: DeckModel, block: Block) -> None:
     model.axes.insert(0, (place, numbers[:3], direction))
 
 
+def _transform(model: DeckModel, block: Block) -> None:
+    held = [nodes for which in model.fixed.values() for nodes in which]
+    read_transform(
+        model.links, block, partial(nodes_named, model), model.nodes, np.concatenate([*held, np.empty(0, np.int64)])
+    )
+
+
+def _elements_named(model: DeckModel, name: str, place: str) -> IntArray:
+    if name.upper() not in model.element_sets:
+        raise unknown(place, "element set", name, list(model.element_sets))
+    return model.element_sets[name.upper()]
+
+
+def _nodes_of_set(model: DeckModel, name: str, place: str) -> IntArray:
+    rows = model.cells[np.isin(model.cells[:, 0], _elements_named(model, name, place)), 1:]
+    return np.unique(rows[rows >= 0])
+
+
+def _rigid_body(model: DeckModel, block: Block) -> None:
+    read_rigid_body(model.links, block, partial(nodes_named, model), model.nodes, partial(_nodes_of_set, model))
+
+
+def _multi_point(model: DeckModel, block: Block) -> None:
+    read_mpc(model.links, block, partial(nodes_named, model), model.nodes, of_abaqus=model.of_abaqus)
+
+
+def _point_property(model: DeckModel, block: Block) -> None:
+    elements = _elements_named(model, block.parameter("ELSET"), block.place)
+    read_point_property(model.links, block, elements, model.nodes)
+
+
 _ACTIONS = {
+    "EQUATION": lambda model, block: read_equation(model.links, block, partial(nodes_named, model)),
+    "MPC": _multi_point,
+    "TRANSFORM": _transform,
+    "RIGID BODY": _rigid_body,
+    "MASS": _point_property,
+    "SPRING": _point_property,
+    "DASHPOT": _point_property,
     "SOLID SECTION": _section,
     "ORIENTATION": _orientation,
     "BOUNDARY": _boundary,

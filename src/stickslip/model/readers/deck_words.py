@@ -28,6 +28,15 @@ PARAMETERS: dict[str, frozenset[str]] = {
         ),
         ("TIE", ["CYCLIC SYMMETRY", "POSITION TOLERANCE"], ["NAME", "ADJUST", "TYPE", "NO ROTATION", "NO THICKNESS"]),
         ("CYCLIC SYMMETRY MODEL", ["N", "ELSET", "INPUT"], ["NGRAPH", "TIE", "CHECK"]),
+        ("EQUATION", ["INPUT"], []),
+        ("MPC", [], []),
+        ("TRANSFORM", ["NSET", "TYPE"], []),
+        ("RIGID BODY", ["NSET", "PIN NSET", "ELSET", "REF NODE", "REFNODE", "ROT NODE", "ROTNODE"], ["POSITION"]),
+        ("COUPLING", ["REF NODE", "REFNODE", "SURFACE"], ["CONSTRAINT NAME"]),
+        ("KINEMATIC", [], []),
+        ("MASS", ["ELSET"], []),
+        ("SPRING", ["ELSET"], ["RTOL"]),
+        ("DASHPOT", ["ELSET"], ["RTOL"]),
         ("INSTANCE", ["NAME", "PART"], []),
         ("INITIAL CONDITIONS", ["TYPE"], ["INPUT", "USER", "FILE", "STEP", "INC", "INSTANCE"]),
     )
@@ -89,6 +98,14 @@ SILENT = frozenset(
         "PRINT",
         "RESTART",
         "MONITOR",
+        "DESIGNVARIABLES",
+        "DESIGN VARIABLES",
+        "DESIGN RESPONSE",
+        "OBJECTIVE",
+        "CONSTRAINT",
+        "SENSITIVITY",
+        "FEASIBLE DIRECTION",
+        "GEOMETRIC CONSTRAINT",
         "FILE FORMAT",
         "FILTER",
         "TIME POINTS",
@@ -102,6 +119,7 @@ SILENT = frozenset(
         "SURFACE INTERACTION",
         "SURFACE BEHAVIOR",
         "FRICTION",
+        "CONTACT DAMPING",
         "GAP CONDUCTANCE",
         "GAP HEAT GENERATION",
         "NODAL THICKNESS",
@@ -133,6 +151,7 @@ TOLD = frozenset(
         "BASE MOTION",
         "LOAD CASE",
         "END LOAD CASE",
+        "CONTACT PAIR",
         "EXPANSION",
         "PLASTIC",
         "CREEP",
@@ -144,27 +163,20 @@ TOLD = frozenset(
 # Initial conditions without effect on mass and stiffness
 PASSING_CONDITIONS = frozenset({"TEMPERATURE", "DISPLACEMENT", "VELOCITY", "FIELD", "ROTATING VELOCITY"})
 
+ABAQUS_WORDS = frozenset({"PART", "ASSEMBLY", "PREPRINT"})  # keywords that CalculiX does not have
+
 # Damping, which a study defines in its own table
 DAMPING = frozenset({"DAMPING", "MODAL DAMPING", "GLOBAL DAMPING", "DAMPING CONTROLS"})
 # Keywords that are known to change the matrices
 REFUSED = frozenset(
     {
-        "MPC",
-        "EQUATION",
-        "RIGID BODY",
-        "COUPLING",
-        "KINEMATIC",
         "DISTRIBUTING",
         "DISTRIBUTING COUPLING",
-        "CONTACT PAIR",
         "CONTACT",
         "SHELL SECTION",
         "BEAM SECTION",
         "BEAM GENERAL SECTION",
         "MEMBRANE SECTION",
-        "SPRING",
-        "DASHPOT",
-        "MASS",
         "ROTARY INERTIA",
         "NONSTRUCTURAL MASS",
         "GAP",
@@ -181,7 +193,6 @@ REFUSED = frozenset(
         "ELGEN",
         "ELCOPY",
         "SYSTEM",
-        "TRANSFORM",
         "DISTRIBUTION",
         "FOUNDATION",
         "EMBEDDED ELEMENT",

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stickslip.errors import InputError, input_error
 from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -174,7 +176,10 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
         remarks.append(f"one of {deck.sectors} sectors; frequencies with free cyclic faces")
     if deck.speed is not None:
         remarks.append(f"rotates at {deck.speed:.6g} rad/s; frequencies at rest")
-    remarks += [f"passed over: {text}" for text in deck.ignored]
+    if deck.links is not None:
+        held = np.count_nonzero(deck.held)
+        remarks.append(f"{deck.mesh.points.size - held - structure.n} dofs follow others (equations, turned supports)")
+    remarks += [*deck.told, *(f"passed over: {text}" for text in deck.ignored)]
     return replace(
         found,
         kind=shown.kind,

@@ -222,6 +222,11 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, o
         sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.numbers, deck.mesh.node_sets)
         low, high = (sets[name] for name in _faces(key, table, sets, sectors))
         deck = held_like_partners(deck, (low, high), table.axis() or deck.axis, sectors)
+    links = deck.links
+    if links is not None and sectors > 1 and deck.sectors is None:
+        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.numbers, deck.mesh.node_sets)
+        faces = [sets[name] for name in _faces(key, table, sets, sectors)]
+        links = replace(links, lasting=np.concatenate(faces))
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
     part = _solid(
         key,
@@ -231,9 +236,13 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, o
         sectors,
         deck.axis,
         held=deck.held if partly.any() else None,
+        links=links,
         quadrature=deck.calculix(table.hourglass) if table.quadrature == "calculix" else deck.exact(table.hourglass),
         clamped_sets=deck.clamped_sets,
-        warnings=(*(f"{table.file}: passed over {text}" for text in deck.ignored),),
+        warnings=(
+            *(f"{table.file}: passed over {text}" for text in deck.ignored),
+            *(f"{table.file}: {text}" for text in deck.told),
+        ),
         own_speed=deck.speed or 0.0,
         **others,
     )
