@@ -449,7 +449,7 @@ def test_prestress_of_a_spinning_bar_raises_its_frequency_as_that_of_other_cells
 
 def test_facets_of_triangles_and_quadrilaterals():
     """The skin of a mixed box encloses its volume; the far end has the area of the box, from facets of both shapes."""
-    from stickslip.contact.facets import lumped_areas
+    from stickslip.model.mesh.facets import lumped_areas
 
     for second in (False, True):
         mesh = mesh_of(("wedges", "hex"), second)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from stickslip.contact.facets import DEGREE, KINDS, REFERENCE_NODES, positions, shape_functions, shape_gradients
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.pairing import (
     contact_frames,
@@ -22,12 +21,13 @@ from stickslip.contact.pairing import (
     paired_interface,
     segment_to_segment,
 )
-from stickslip.contact.projection import closest
 from stickslip.contact.segmentation import HIGHEST_DEGREE, clip, triangle_rule
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface, structure_surface
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import rayleigh_damping
+from stickslip.model.mesh.facets import DEGREE, KINDS, REFERENCE_NODES, positions, shape_functions, shape_gradients
+from stickslip.model.mesh.nearest_facets import closest
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response

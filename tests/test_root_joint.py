@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 from stickslip.api.result import Result
 from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
-from stickslip.contact.facets import KINDS
 from stickslip.contact.mortar import mortar_tie
 from stickslip.errors import InputError
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.facets import KINDS
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree
 

@@ -9,9 +9,9 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.facets import centres, normals
 from stickslip.contact.surface import SMOOTH, Surface, nodal_surface, rigid_surface
 from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
+from stickslip.model.mesh.facets import centres, normals
 from stickslip.model.mesh.solid_mesh import facets_of
 from stickslip.model.part import BodyPoints, Part
 from stickslip.model.structure import Dofs, is_numbered, join_dofs

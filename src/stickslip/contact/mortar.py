@@ -4,10 +4,10 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.contact.facets import interpolation, lumped_areas
 from stickslip.contact.segmentation import segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
+from stickslip.model.mesh.facets import interpolation, lumped_areas
 
 MAX_UNCOVERED = 1e-3  # share of side A that may extend beyond side B
 ROUNDING_WEIGHT = 1e-14  # weights below are rounding

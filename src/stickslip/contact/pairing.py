@@ -11,13 +11,13 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.facets import positions
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.projection import facet_balls, project
 from stickslip.contact.segmentation import SKIP, Outside, need_facets, segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.facets import positions
 
 PARALLEL = 1e-3  # sine of the smallest angle between the direction of t and a normal
 LISTED = 5  # points that a message names

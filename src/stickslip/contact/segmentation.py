@@ -11,7 +11,10 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.contact.facets import (
+from stickslip.contact.projection import facet_balls, meet
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.facets import (
     CORNERS,
     DEGREE,
     REFERENCE_NODES,
@@ -21,9 +24,7 @@ from stickslip.contact.facets import (
     positions,
     shape_functions,
 )
-from stickslip.contact.projection import facet_balls, meet, near_pairs
-from stickslip.contact.surface import Surface
-from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.nearest_facets import near_pairs
 
 # degree -> orbits (weight, barycentric coordinates); an orbit holds all permutations
 _ORBITS: dict[int, tuple[tuple[float, tuple[float, float, float]], ...]] = {

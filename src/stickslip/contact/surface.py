@@ -6,7 +6,8 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.facets import (
+from stickslip.errors import input_error
+from stickslip.model.mesh.facets import (
     KINDS,
     centres,
     corner_counts,
@@ -16,7 +17,6 @@ from stickslip.contact.facets import (
     node_normals,
     normals,
 )
-from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
 
