@@ -11,6 +11,7 @@ from stickslip.assembly.forces import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.laws import law_name
 from stickslip.model.damping import Damping
+from stickslip.model.fe.material import ElasticMaterial, Material
 from stickslip.model.part import Part
 from stickslip.units import HZ, RPM, quantity_of
 
@@ -72,8 +73,11 @@ def _part(part: Part) -> dict[str, Any]:
     found: dict[str, Any] = {"shape": f"{part.structure.n} dof{'s' * (part.structure.n != 1)}{mesh}"}
     if part.sectors > 1:
         found["sectors"] = part.sectors
-    if part.solid is not None and not isinstance(part.solid.material, list | tuple):
-        found["material"] = _values(part.solid.material) or {"kind": "steel"}
+    own = None if part.solid is None else part.solid.material
+    if isinstance(own, Material):
+        found["material"] = _values(own) or {"kind": "steel"}
+    elif isinstance(own, ElasticMaterial):
+        found["material"] = {"kind": own.in_words}
     if part.damping is not None:
         found["damping"] = _damping(part.damping)
     return found

@@ -282,6 +282,43 @@ def elastic_material(
     )
 
 
+def cast_orientation(
+    stacking: Sequence[float],
+    reference: Sequence[float],
+    tilt: float,
+    azimuth: float,
+    secondary: float,
+    around: Axis | None = None,
+) -> Orientation:
+    """Return the axes of a single crystal as a foundry states them; axis 3 is the ⟨001⟩ direction nearest the stacking axis.
+
+    Axis 1 first lies at `secondary` from the reference about the stacking axis, and axis 3 along the stacking axis. Both are then
+    turned by `tilt` about the axis across the stacking axis that leads axis 3 towards `azimuth`.
+
+    Parameters
+    ----------
+    stacking
+        Vector along the stacking axis.
+    reference
+        Vector from whose part across the stacking axis the angles are counted.
+    tilt
+        Angle between axis 3 and the stacking axis, rad.
+    azimuth, secondary
+        Angles about the stacking axis from the reference, rad.
+    around
+        As of `Orientation`.
+    """
+    base = np.asarray(Orientation.of_axes(stacking, reference).axes)
+    up, side, across = base.T  # stacking axis, reference across it, and their normal
+    x, y, z = up.tolist()
+    about = Axis((x, y, z))
+    a, b, c = (about.rotation(azimuth) @ across).tolist()
+    turn = Axis((a, b, c)).rotation(tilt)
+    first = turn @ about.rotation(secondary) @ side
+    third = turn @ up
+    return Orientation(_nested(np.column_stack([first, np.cross(third, first), third])), around)
+
+
 def moved_materials(material: Materials, turn: FloatArray, move: FloatArray) -> Materials:
     """Return the materials of a body that is turned by the orthogonal (3, 3) `turn`, then moved by `move` (3,) in m."""
     if not isinstance(material, Sequence):

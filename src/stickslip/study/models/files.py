@@ -14,7 +14,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.hourglass import hourglass_doubts
-from stickslip.model.fe.material import Material, Materials
+from stickslip.model.fe.material import Materials
 from stickslip.model.matrices_at_speeds import AtSpeed, SpeedMatrices, speed_matrices, warnings_of
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
@@ -136,7 +136,7 @@ COMPANIONS = (".mas", ".dof")  # suffixes of the files that CalculiX writes with
 _KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
 
 
-def file_part(key: str, table: FileModel, home: Path, material: Material | None, **others: Any) -> Part:
+def file_part(key: str, table: FileModel, home: Path, material: Materials | None, **others: Any) -> Part:
     """Read a part from its files.
 
     Parameters
@@ -215,7 +215,7 @@ def _units(table: FileModel) -> Units:
     return Units.named(table.units)
 
 
-def _from_deck(key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]) -> Part:
+def _from_deck(key: str, table: FileModel, path: Path, given: Materials | None, others: dict[str, Any]) -> Part:
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     if deck.sectors is None and sectors > 1 and table.cyclic == "node_to_node":
@@ -341,7 +341,9 @@ def _solid(
     )
 
 
-def _from_own_reader(key: str, table: FileModel, home: Path, material: Material | None, others: dict[str, Any]) -> Part:
+def _from_own_reader(
+    key: str, table: FileModel, home: Path, material: Materials | None, others: dict[str, Any]
+) -> Part:
     """Read a part with the user's function."""
     place = f"{key}.reader"
     found = called(str(table.reader), place, home / table.file, units=_units(table))

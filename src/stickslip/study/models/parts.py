@@ -16,7 +16,7 @@ from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
-from stickslip.model.fe.material import Material
+from stickslip.model.fe.material import AnyMaterial, Material
 from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.sector import BladedSector
@@ -109,12 +109,12 @@ class Workshop:
             return placed_body(made, place_in_steps(table.placed))  # type: ignore[attr-defined]
         return made
 
-    def material(self, table: Any) -> Material | None:
+    def material(self, table: Any) -> AnyMaterial | None:
         """Return the material of a part; None if the study names none."""
         given = table.material or self.tables.material
-        return None if given is None else build(Material, given)
+        return None if given is None else given.library()
 
-    def _material(self, name: str, table: Any) -> Material:
+    def _material(self, name: str, table: Any) -> AnyMaterial:
         found = self.material(table)
         if found is None:
             raise input_error(f"part.{name}.material", "is missing", "Add the table [material], or one of the part.")
@@ -148,7 +148,12 @@ class Workshop:
 
     def beam(self, name: str, table: Any) -> Part:
         """Make a beam along x."""
-        shape = build(Beam, table, material=self._material(name, table))
+        material = self._material(name, table)
+        if not isinstance(material, Material):
+            raise input_error(
+                f"part.{name}.material", "is anisotropic, and beams are not", "Give Young's modulus, or mesh the part."
+            )
+        shape = build(Beam, table, material=material)
         structure = beam(shape, table.elements, bending=table.bending, axial=table.axial)
         return structure_part(structure, **self.others(table, reduced=False))
 

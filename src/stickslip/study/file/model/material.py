@@ -1,19 +1,31 @@
 """The tables [material], [damping] and [reduction], of the whole study or of a part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
+from stickslip.errors import InputError
+from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
-from stickslip.model.fe.material import Material
+from stickslip.model.fe.material import (
+    AnyMaterial,
+    Material,
+    Orientation,
+    cast_orientation,
+    elastic_material,
+    orthotropic_stiffness,
+)
 from stickslip.model.readers.units import MODULI, SOLIDS
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
-from stickslip.study.file.quantities import table_of
-from stickslip.study.file.section import Positive, Section, custom_error, own_object, rising_pair
+from stickslip.study.file.model.bodies import Direction, Triple
+from stickslip.study.file.quantities import build, refused_by, table_of
+from stickslip.study.file.section import Positive, Section, custom_error, own_object, refuse_all, rising_pair
 from stickslip.study.own_code import is_address
+from stickslip.units import DEG
 
 FEW = 25  # default number of fixed-interface modes
 OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
@@ -23,8 +35,101 @@ STRESSES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
 DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
 
 
+Three = Annotated[list[float], Field(min_length=3, max_length=3)]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+
+class OrientationTable(Section):
+    """Axes 1, 2, 3 of a material, of a cubic crystal its ⟨001⟩ directions: two axes, Euler angles, or the angles of a casting."""
+
+    axis_1: Direction | None = Field(
+        None, description='direction of axis 1: "x", "-z" or a vector [x, y, z]; goes with axis_2'
+    )
+    axis_2: Direction | None = Field(
+        None, description="a direction in the plane of the axes 1 and 2, on the side of axis 2"
+    )
+    euler_deg: Annotated[list[Angle], Field(min_length=3, max_length=3)] | None = Field(
+        None,
+        description="Euler angles [φ1, Φ, φ2] in degrees by Bunge: the axes are turned about z, then about the new axis 1, then about the new axis 3",
+    )
+    stacking_axis: Direction | None = Field(
+        None,
+        description='of a casting: direction from which axis 3, the nearest ⟨001⟩, is tilted, such as "x" or [1, 0, 0]; goes with reference',
+    )
+    reference: Direction | None = Field(
+        None,
+        description="of a casting: direction, across the stacking axis, from which azimuth and secondary angle are counted",
+    )
+    tilt_deg: Annotated[float, Field(ge=0, le=90)] = Field(
+        0.0, description="of a casting: angle between axis 3 and the stacking axis in degrees, 0 to 90"
+    )
+    azimuth_deg: Angle = Field(
+        0.0,
+        description="of a casting: direction towards which axis 3 is tilted, in degrees about the stacking axis from the reference",
+    )
+    secondary_deg: Angle = Field(
+        0.0,
+        description="of a casting: angle of axis 1 about the stacking axis from the reference, before the tilt, in degrees",
+    )
+    around: Direction | None = Field(
+        None,
+        description="direction of the axis of a cylinder about which the material is wound: axes are then given in radial (x), tangential (y) and axial (z) direction of each place; left out: they are the same everywhere",
+    )
+    around_origin_m: Triple = Field([0.0, 0.0, 0.0], description="a point [x, y, z] of that axis in m")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        refuse_all(self._problems())
+        try:
+            self.library()
+        except InputError as error:
+            raise custom_error(error.problem, error.remedy) from None
+        return self
+
+    def _problems(self) -> Iterator[PydanticCustomError]:
+        ways = {"axis_1": self.axis_1, "euler_deg": self.euler_deg, "stacking_axis": self.stacking_axis}
+        given = [name for name, value in ways.items() if value is not None]
+        if len(given) > 1:
+            yield custom_error(f"is given together with {given[0]}", "Give the axes in one way.", given[1])
+        for one, other in (("axis_1", "axis_2"), ("stacking_axis", "reference")):
+            if (getattr(self, one) is None) != (getattr(self, other) is None):
+                missing = one if getattr(self, one) is None else other
+                yield custom_error("is missing beside the other", f"Give {one} and {other}.", missing)
+        if self.stacking_axis is None:
+            for key in ("tilt_deg", "azimuth_deg", "secondary_deg"):
+                if key in self.model_fields_set:
+                    yield custom_error("goes together with stacking_axis", "Give the axis of the casting.", key)
+        if not given and self.around is None:
+            yield custom_error(
+                "names no axes", "Give axis_1 and axis_2, euler_deg, or stacking_axis and reference.", "axis_1"
+            )
+        if "around_origin_m" in self.model_fields_set and self.around is None:
+            yield custom_error("goes together with around", "Give the direction of the axis.", "around_origin_m")
+
+    def library(self) -> Orientation:
+        """Return the orientation."""
+        around = None
+        if self.around is not None:
+            (a, b, c), (x, y, z) = self.around, self.around_origin_m
+            around = Axis((a, b, c), (x, y, z))
+        if self.axis_1 is not None and self.axis_2 is not None:
+            return Orientation.of_axes(self.axis_1, self.axis_2, around)
+        if self.stacking_axis is not None and self.reference is not None:
+            tilt, azimuth, secondary = (DEG * a for a in (self.tilt_deg, self.azimuth_deg, self.secondary_deg))
+            return cast_orientation(self.stacking_axis, self.reference, tilt, azimuth, secondary, around)
+        first, second, third = (DEG * angle for angle in self.euler_deg or (0.0, 0.0, 0.0))
+        upright, across = Axis((0, 0, 1)), Axis((1, 0, 0))
+        turn = upright.rotation(first) @ across.rotation(second) @ upright.rotation(third)
+        return Orientation(tuple(tuple(row) for row in turn.tolist()), around)
+
+
+# keys of an orthotropic material
+ORTHOTROPIC = ("young_moduli_pa", "poisson_ratios", "shear_moduli_pa")
+
+
 class _PlausibleMaterial(Section):
-    """Checks that the numbers are plausible for a solid."""
+    """Checks that the numbers are plausible for a solid, and that they are those of one kind of material."""
 
     plausible: bool = Field(
         True,
@@ -35,22 +140,126 @@ class _PlausibleMaterial(Section):
     @classmethod
     def _is_of_a_solid(cls, value: float, info: ValidationInfo) -> float:
         """Refuse a value that no solid has, as the readers of decks do."""
-        stiff = info.field_name == "young_modulus_pa"
-        (low, high), unit = (MODULI, "Pa") if stiff else (SOLIDS, "kg/m³")
-        if low <= value <= high or not info.data.get("plausible", True):
-            return value
-        meant = [
-            f", which is {value * factor:.4g} {unit} if it is in {name}"
-            for name, factor in (STRESSES if stiff else DENSITIES).items()
-            if low <= value * factor <= high
-        ]
-        raise custom_error(
-            f"no solid has {value:g} {unit}{meant[0] if meant else ''}",
-            f"Give a value from {low:g} to {high:g} {unit}, or plausible = false where the number is right.",
-        )
+        if info.data.get("plausible", True):
+            refuse_implausible(value, stiff=info.field_name == "young_modulus_pa")
+        return value
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Self:
+        refuse_all(self._problems())
+        made = refused_by(Material, self.library)
+        if self.plausible and not isinstance(made, Material):
+            refuse_implausible(made.young_modulus, stiff=True)
+        return self
+
+    def _problems(self) -> Iterator[PydanticCustomError]:
+        given = self.model_fields_set
+        full = "elasticity_pa" in given
+        nine = [key for key in ORTHOTROPIC if key in given]
+        if full and nine:
+            yield custom_error("is given together with elasticity_pa", "Give the constants or the matrix.", nine[0])
+        for key in ORTHOTROPIC if nine else ():
+            if key not in given:
+                yield custom_error(f"is missing beside {nine[0]}", "An orthotropic material has nine constants.", key)
+        for key in ("young_modulus_pa", "poisson_ratio", "shear_modulus_pa"):
+            if key in given and (full or nine):
+                other = "elasticity_pa" if full else nine[0]
+                yield custom_error(
+                    f"is given together with {other}", "Give the constants of one kind of material.", key
+                )
+        for key in ("young_modulus_pa", "poisson_ratio"):
+            if "shear_modulus_pa" in given and key not in given:
+                yield custom_error("is missing beside shear_modulus_pa", "A cubic crystal has three constants.", key)
+        if "orientation" in given and not (full or nine or "shear_modulus_pa" in given):
+            yield custom_error(
+                "belongs to an anisotropic material, and this one is isotropic",
+                "Give shear_modulus_pa (a cubic crystal), nine constants or elasticity_pa, or leave it out.",
+                "orientation",
+            )
+
+    def library(self) -> AnyMaterial:
+        """Return the material.
+
+        Raises
+        ------
+        PydanticCustomError
+            If the constants belong to no stable material.
+        """
+        table: Any = self
+        if not {*ORTHOTROPIC, "shear_modulus_pa", "elasticity_pa"} & self.model_fields_set:
+            isotropic: Material = build(Material, self)
+            return isotropic
+        axes = None if table.orientation is None else table.orientation.library()
+        density, key = table.density_kg_per_m3, "elasticity_pa"
+        try:
+            if table.elasticity_pa is not None:
+                return elastic_material(table.elasticity_pa, density, axes, order="23-13-12")
+            if table.shear_modulus_pa is not None:
+                key = "shear_modulus_pa"
+                constants = [table.young_modulus_pa] * 3, [table.poisson_ratio] * 3, [table.shear_modulus_pa] * 3
+            else:
+                key = ORTHOTROPIC[0]
+                constants = table.young_moduli_pa, table.poisson_ratios, table.shear_moduli_pa
+            return elastic_material(orthotropic_stiffness(*constants), density, axes)
+        except InputError as error:
+            raise custom_error(error.problem, error.remedy, key) from None
 
 
-MaterialTable: Any = table_of(Material, base=_PlausibleMaterial, name="MaterialTable")
+def refuse_implausible(value: float, *, stiff: bool) -> None:
+    """Refuse a modulus in Pa (`stiff`) or a density in kg/m³ that no solid has."""
+    (low, high), unit = (MODULI, "Pa") if stiff else (SOLIDS, "kg/m³")
+    if low <= value <= high:
+        return
+    meant = [
+        f", which is {value * factor:.4g} {unit} if it is in {name}"
+        for name, factor in (STRESSES if stiff else DENSITIES).items()
+        if low <= value * factor <= high
+    ]
+    raise custom_error(
+        f"no solid has {value:g} {unit}{meant[0] if meant else ''}",
+        f"Give a value from {low:g} to {high:g} {unit}, or plausible = false where the number is right.",
+    )
+
+
+MaterialTable: Any = table_of(
+    Material,
+    base=_PlausibleMaterial,
+    name="MaterialTable",
+    shear_modulus_pa=(
+        Positive | None,
+        Field(
+            None,
+            description="shear modulus in Pa of a cubic (single) crystal: with it young_modulus_pa and poisson_ratio are those along its ⟨001⟩ axes",
+        ),
+    ),
+    young_moduli_pa=(
+        Annotated[list[Positive], Field(min_length=3, max_length=3)] | None,
+        Field(None, description="of an orthotropic material: Young's moduli [E1, E2, E3] in Pa"),
+    ),
+    poisson_ratios=(
+        Three | None,
+        Field(
+            None,
+            description="of an orthotropic material: Poisson's ratios [ν12, ν13, ν23]; ν12 is minus the strain along 2 over that along 1 under tension along 1",
+        ),
+    ),
+    shear_moduli_pa=(
+        Annotated[list[Positive], Field(min_length=3, max_length=3)] | None,
+        Field(None, description="of an orthotropic material: shear moduli [G12, G13, G23] in Pa"),
+    ),
+    elasticity_pa=(
+        Annotated[list[Six], Field(min_length=6, max_length=6)] | None,
+        Field(
+            None,
+            description="of any material: six rows of the symmetric matrix from strains to stresses in Pa, in the order 11, 22, 33, 23, 13, 12 with doubled shear strains",
+        ),
+    ),
+    orientation=(
+        OrientationTable | None,
+        Field(None, description="the table of the axes of an anisotropic material; left out: the global axes"),
+    ),
+)
+MaterialTable.__doc__ = "A linear elastic material: isotropic, a cubic crystal, orthotropic, or given by its matrix."
 
 
 def _named_or_own(given: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
