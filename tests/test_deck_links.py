@@ -327,3 +327,56 @@ def test_nodes_of_cyclic_faces_do_not_follow(tmp_path):
     kept = type(links)(links.equations, links.places, links.mass, links.springs, links.dashpots, "", np.array([8, 12]))
     with pytest.raises(InputError, match=r"line 33, \*EQUATION: ties nodes of the cyclic faces"):
         rotating_solid(deck.mesh, deck.material, links=kept)
+
+
+def block(first, start, count, side=0.1):
+    """Return cards of bricks that fill a cube with `count` bricks along y and z, one along x; numbers begin after `first`."""
+    nodes, cells, place = ["*NODE"], ["*ELEMENT, TYPE=C3D8, ELSET=E"], {}
+    for i, j, k in np.ndindex(2, count + 1, count + 1):
+        place[i, j, k] = first + len(place) + 1
+        x, y, z = start + side * i, side * j / count, side * k / count
+        nodes.append(f"{place[i, j, k]}, {x:.16g}, {y:.16g}, {z:.16g}")
+    for n, (j, k) in enumerate(np.ndindex(count, count)):
+        own = [place[i, j + b, k + c] for c in (0, 1) for i, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        cells.append(", ".join(map(str, [first + n + 1, *own])))
+    ends = f"*ELSET, ELSET=B{first}, GENERATE\n{first + 1}, {first + count**2}\n"
+    ends += f"*SURFACE, NAME=L{first}\nB{first}, S6\n*SURFACE, NAME=H{first}\nB{first}, S4\n"
+    return "\n".join([*nodes, *cells]) + "\n" + ends
+
+
+def tied(slave, master, options="", gap=0.0):
+    return block(0, 0.0, 2) + block(100, 0.1 + gap, 3) + STEEL + f"*TIE, NAME=T{options}\n{slave}, {master}\n"
+
+
+def test_tied_faces_that_match_are_one_mesh(tmp_path):
+    """Two cubes of four bricks each, tied, have the frequencies of the two with common nodes."""
+    held = "*NSET, NSET=A, GENERATE\n1, 9\n*BOUNDARY\nA, 1, 3\n"
+    text = block(0, 0.0, 2) + block(100, 0.1, 2) + STEEL + held
+    joined = every_frequency(assemble_deck(read(tmp_path, text + "*TIE, NAME=T\nL100, H0\n")))
+    common = text + equations([(101 + k, 10 + k) for k in range(9)])
+    np.testing.assert_allclose(joined, every_frequency(assemble_deck(read(tmp_path, common))), rtol=1e-10)
+
+
+@pytest.mark.parametrize(("slave", "master"), [("L100", "H0"), ("H0", "L100")])
+def test_a_tie_of_faces_that_do_not_match_carries_linear_fields(tmp_path, slave, master):
+    """Rigid motions and constant strains stay free of contradiction: independent nodes that move so take the others along."""
+    deck = read(tmp_path, tied(slave, master))
+    solid = rotating_solid(deck.mesh, deck.material, quadrature=deck.quadrature, links=deck.links)
+    gradient = np.random.default_rng(1).normal(size=(3, 3))
+    field = deck.mesh.points @ gradient.T + [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(solid.at_nodes(field.ravel()[solid.moving]), field, atol=1e-12)
+
+
+def test_a_gap_within_the_tolerance_is_closed(tmp_path):
+    deck = read(tmp_path, tied("L100", "H0", ", POSITION TOLERANCE=0.002", gap=0.001))
+    assert set(deck.mesh.points[:, 0].round(12)) == {0.0, 0.1, 0.201}
+    kept = read(tmp_path, tied("L100", "H0", ", POSITION TOLERANCE=0.002, ADJUST=NO", gap=0.001))
+    assert set(kept.mesh.points[:, 0].round(12)) == {0.0, 0.1, 0.101, 0.201}
+    with pytest.raises(InputError, match=r"no node of 'L100' lies within 0\.0005 of 'H0'\. Correct the surfaces"):
+        read(tmp_path, tied("L100", "H0", ", POSITION TOLERANCE=0.0005", gap=0.001))
+
+
+def test_nodes_beyond_the_tolerance_are_told(tmp_path):
+    text = tied("L100", "H0").replace("*NODE\n101, 0.1,", "*NODE\n101, 0.12,")
+    deck = read(tmp_path, text)
+    assert deck.ignored[0].startswith("the tie of 1 of 16 nodes of L100, which lie further than 0.00125 from H0 (")

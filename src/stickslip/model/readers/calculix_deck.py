@@ -7,8 +7,6 @@ materials, supports, ties and steps; and with only NumPy and SciPy installed it 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,121 +18,15 @@ from stickslip.model.fe.elements import EXACT, Quadrature, Rules
 from stickslip.model.fe.links import Links, eliminate
 from stickslip.model.fe.material import AnyMaterial
 from stickslip.model.fe.solid import integrate, support
-from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
-from stickslip.model.readers.deck_links import links_of_mesh, read_coupling
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.readers.deck_links import links_of_mesh
 from stickslip.model.readers.deck_materials import material_of, read_orientation
-from stickslip.model.readers.deck_model import DeckModel, interpret, nodes_named, passed_over, unknown, unread
-from stickslip.model.readers.keywords import Block, keyword_blocks, real_number, unique_in_order, whole_number
+from stickslip.model.readers.deck_model import DeckModel, interpret, unknown
+from stickslip.model.readers.deck_surfaces import couple, tie_faces
+from stickslip.model.readers.keywords import keyword_blocks, unique_in_order
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
 from stickslip.model.structure import Structure
-
-# corners of the faces S1, S2, …, counted from 0, by number of corners of a cell
-FACES: dict[int, tuple[tuple[int, ...], ...]] = {
-    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    5: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
-    6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
-}
-
-
-def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
-    """Add the faces of the cyclic ties to the model; refuse other ties, and several instances.
-
-    Parameters
-    ----------
-    model
-        Model from the other keywords.
-    blocks
-        Blocks of the whole file.
-    ignore
-        Keywords to ignore although they change the model.
-
-    Raises
-    ------
-    InputError
-        If a tie is not cyclic, or its surfaces are missing.
-    """
-    passed = passed_over(ignore)
-    instances = [b for b in blocks if b.keyword == "INSTANCE"]
-    moved = len(instances) > 1 or any(list(b.rows()) for b in instances)
-    if moved and "INSTANCE" not in passed:
-        raise unread(instances[-1], "several instances, or a moved one, are not read")
-    surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
-    for block in blocks:
-        if block.keyword != "TIE" or "TIE" in passed:
-            continue
-        if "CYCLIC SYMMETRY" not in block.parameters:
-            raise unread(block, "a *TIE that is not cyclic changes the model and is not read")
-        rows = list(block.rows())
-        if len(rows) != 1 or len(rows[0][1]) < 2:
-            raise input_error(block.place, "needs one line with two surfaces", "Add it.")
-        place, fields = rows[0]
-        low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
-        model.ties.append((low, high))
-        if block.parameters.get("POSITION TOLERANCE"):
-            reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
-            model.reach = max(model.reach, reach)
-        if model.sectors is None:
-            raise input_error(
-                block.place,
-                "is cyclic, but nothing says how many sectors there are",
-                "Add *CYCLIC SYMMETRY MODEL, N=….",
-            )
-
-
-def couple(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> None:
-    """Add the couplings of surfaces with reference nodes to the links of the model."""
-    passed = passed_over(ignore)
-    surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
-    for block, below in pairwise([*blocks, Block("END", {}, blocks[-1].path, 0)]):
-        if block.keyword != "COUPLING" or "COUPLING" in passed:
-            continue
-        if below.keyword != "KINEMATIC":
-            raise unread(block, "a *COUPLING without *KINEMATIC in the next line ties nodes and is not read")
-        surface = _surface_nodes(model, surfaces, block.parameter("SURFACE").upper(), block.place)
-        read_coupling(model.links, block, below, partial(nodes_named, model), model.nodes, surface)
-
-
-def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
-    if name not in surfaces:
-        raise unknown(place, "surface", name, list(surfaces))
-    block = surfaces[name]
-    kind = block.parameters.get("TYPE", "ELEMENT").upper()
-    if kind == "NODE":
-        parts = [nodes_named(model, fields[0], where) for where, fields in block.rows()]
-    elif kind == "ELEMENT":
-        parts = [_face_nodes(model, fields, where) for where, fields in block.rows()]
-    else:
-        raise input_error(block.place, f"a surface of TYPE={kind} is not read", "Use TYPE=NODE or ELEMENT.")
-    if not parts:
-        raise input_error(block.place, "holds no nodes", "List node sets or element faces.")
-    return unique_in_order(np.concatenate(parts))
-
-
-def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
-    """Return the nodes of ``element or set, face``, e.g. ``SIDE, S3``."""
-    if fields[0].upper() in model.element_sets:
-        numbers = model.element_sets[fields[0].upper()]
-    else:
-        numbers = np.array([whole_number(fields[0], place, "element")])
-    rows = np.flatnonzero(np.isin(model.cells[:, 0], numbers))
-    if not len(rows):
-        raise unknown(place, "element or element set", fields[0], list(model.element_sets))
-    face = fields[1].upper() if len(fields) > 1 else ""
-    found = []
-    for width, own in by_kind(model.cells[rows, 1:]):
-        faces = FACES[CORNERS[width]]
-        if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
-            raise input_error(
-                place, f"{face!r} is no face of {model.kinds[rows[own[0]]]}", f"Write S1 to S{len(faces)}."
-            )
-        corners = faces[int(face[1:]) - 1]
-        edges = EDGES[CORNERS[width]] if width > CORNERS[width] else ()
-        middles = [CORNERS[width] + i for i, ends in enumerate(edges) if set(ends) <= set(corners)]
-        found.append(model.cells[rows[own]][:, [1 + i for i in (*corners, *middles)]].ravel())
-    return np.concatenate(found).astype(np.int64)
-
 
 PAIRED = 1e-3  # largest distance between a rotated cyclic face and the other face, over the size of the face
 ROUNDING = 1e-9  # squares of direction cosines below this value are zero
