@@ -17,10 +17,10 @@ from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts import working_range
 from stickslip.analyses.forced_response.verdicts.working_range import WorkingRange
-from stickslip.report.cases import cases_of, families_of, without_common_words
+from stickslip.report.cases import cases_of, families_of
 from stickslip.report.content import Words
 from stickslip.report.paper.figure import draw
-from stickslip.study.file.case_names import Naming
+from stickslip.study.file.case_names import Naming, shortened, without_common_words
 from stickslip.study.varied import families
 
 FORCE, MASS, MU = "load.shaker.force_n", "part.damper.mass_kg", "contact.flat.friction_coefficient"
@@ -93,6 +93,16 @@ def test_what_names_have_in_common_becomes_the_title_of_their_axis(
     names: list[str], title: str, short: list[str]
 ) -> None:
     assert without_common_words(names) == (title, short)
+
+
+def test_long_names_in_a_column_lose_what_they_have_in_common_and_short_ones_nothing() -> None:
+    long = [f"tangential stiffness {k} N/mm, force {f} N" for k in (20, 50) for f in (2, 5)]
+    assert shortened(long) == (
+        "tangential stiffness, force",
+        ["20 N/mm, 2 N", "20 N/mm, 5 N", "50 N/mm, 2 N", "50 N/mm, 5 N"],
+    )
+    assert shortened(["force 2 N", "force 5 N"]) == ("case", ["force 2 N", "force 5 N"])
+    assert shortened([]) == ("case", [])
 
 
 def test_every_case_stands_in_one_family_and_the_families_are_sorted_by_value() -> None:

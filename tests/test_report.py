@@ -32,13 +32,13 @@ from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures import edges, reduction, skin_picture
 from stickslip.api.model import Model
 from stickslip.errors import InputError
-from stickslip.report.cases import without_common_words
 from stickslip.report.content import Table
 from stickslip.report.frame import Chapter, Placing, page_html
 from stickslip.report.plot import Plot, log_ticks, styled
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.result import Node
 from stickslip.report.tiles import patches, triangulated
+from stickslip.study.file.case_names import without_common_words
 from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.verdict import Verdict, to_json
 

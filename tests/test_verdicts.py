@@ -168,6 +168,13 @@ def test_verdicts_that_differ_in_the_case_alone_are_told_once() -> None:
     assert concluded(given, "", bad=False).counts == "2 notes"
     # no product of values: each case by its name
     assert together(["5 g, mu 0.3", "10 g, mu 0.5"]) == "5 g, mu 0.3; 10 g, mu 0.5"
+    # no product either: split by the part that gives the shortest text
+    steps = ["k 2 N, f 1 N", "k 2 N, f 2 N", "k 5 N, f 1 N", "k 5 N, f 2 N", "k 5 N, f 3 N"]
+    assert together(steps) == "f 1 N, 2 N, each with k 2 N; f 1 N, 2 N, 3 N, each with k 5 N"
+    # trusted cases whose numbers differ, some of them equal: one line for all of them, again by their parts
+    numbers = ("0.1 %", "0.2 %", "0.1 %", "0.3 %", "0.1 %")
+    told = [Verdict("trusted", case, 10.0, f"peak, error {n}") for case, n in zip(steps, numbers, strict=True)]
+    assert in_lines(told) == [f"TRUSTED: {together(steps)}."]
     assert together(["5 g, mu 0.3", "5 g, mu 0.5", "10 g, mu 0.3", "10 g, mu 0.5"]) == "5 g, 10 g with mu 0.3, 0.5"
     assert together(["5 g, 10 g, each with mu 0.3", "20 g, mu 0.5"]) == "5 g, 10 g, each with mu 0.3; 20 g, mu 0.5"
 

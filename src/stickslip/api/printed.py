@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from stickslip.errors import printable
+from stickslip.study.file.case_names import CASE, shortened
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 _DECIMALS = 5  # most decimals of cells that are printed unchanged
@@ -58,6 +59,7 @@ def say_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], li
         return
     say(f"\n{title}")
     table = Table()
+    head, rows = _with_short_names(head, rows)
     told = [k for k in range(len(head)) if any(row[k] for row in rows)]
     for name in (head[k] for k in told):
         table.add_column(name, justify="right")
@@ -69,13 +71,24 @@ def say_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], li
         say(f"  {line}")
 
 
+def _with_short_names(
+    head: Sequence[str], rows: Sequence[Sequence[str]]
+) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
+    """Return a table whose long names of cases are without the words that they have in common; the heading has them."""
+    if not rows or head[0] != CASE:
+        return head, rows
+    first, names = shortened([row[0] for row in rows])
+    return [first, *head[1:]], [[name, *row[1:]] for name, row in zip(names, rows, strict=True)]
+
+
 def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table whose cells wrap."""
     say(f"\n{title}")
     table = Table()
-    for name in names:
+    head, cells_of = _with_short_names(list(names), list(rows))
+    for name in head:
         table.add_column(name, overflow="fold")
-    for cells in rows:
+    for cells in cells_of:
         table.add_row(*(Text(printable(cell)) for cell in cells))
     console().print(table)
 

@@ -7,10 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.report.plot import ramp
-from stickslip.study.file.case_names import JOINT
 from stickslip.study.varied import assigned_of, families, first_varied_number, varied_values
-
-CASE = "case"  # heading of legends and columns
 
 
 @dataclass(frozen=True)
@@ -65,24 +62,6 @@ def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
     """Return the first varied key whose values are numbers, and its values (case,); NaN if there is none."""
     key, values = first_varied_number(data)
     return key, values
-
-
-def without_common_words(names: Sequence[str]) -> tuple[str, list[str]]:
-    """Split names that begin alike in all their parts: ``force 2 N, mu 0.3`` and others -> ``force, mu`` and ``2 N, 0.3`` and others.
-
-    The first result is empty, and the names are whole, if they have no common words.
-    """
-    rows = [[part.split(" ") for part in name.split(JOINT)] for name in names]
-    if len({len(row) for row in rows}) != 1 or len(names) < 2 or any("=" in name for name in names):
-        return "", list(names)
-    common = []
-    for parts in zip(*rows, strict=True):
-        words = [same.pop() for same in map(set, zip(*(part[:-1] for part in parts), strict=False)) if len(same) == 1]
-        alike = all(part[: len(words)] == words for part in parts)
-        common.append(words if alike and len(set(map(tuple, parts))) > 1 else [])
-    title = JOINT.join(" ".join(words) for words in common if words)
-    short = [JOINT.join(" ".join(part[len(w) :]) for part, w in zip(row, common, strict=True)) for row in rows]
-    return title, short
 
 
 def families_of(data: xr.Dataset, key: str, cases: Sequence[ShownCase]) -> dict[str, list[ShownCase]]:

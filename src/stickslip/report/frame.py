@@ -4,7 +4,7 @@ import re
 from base64 import b64decode, b64encode
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +19,7 @@ from plotly.offline import get_plotlyjs
 from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card, Content
+from stickslip.study.file.case_names import CASE, shortened
 from stickslip.study.store.atomic_write import write_whole
 from stickslip.study.verdict import JOINT, Verdict, likewise, of_kinds, once, worst_first
 
@@ -119,7 +120,7 @@ class Placing:
 
     def _placed(self, own: Content) -> Placed:
         if not isinstance(own, Plot):
-            return Placed(own, _kind(own))
+            return Placed(_with_short_names(own), _kind(own))
         self.figures += 1
         drawing = to_html(
             _slim(_in_short_lines(own.figure.to_dict())),
@@ -164,6 +165,19 @@ def _slim(drawn: Any) -> Any:
         values = np.frombuffer(b64decode(drawn["bdata"]), dtype="<f8").astype("<f4")
         return {**drawn, "dtype": "f4", "bdata": b64encode(values.tobytes()).decode("ascii")}
     return {key: _slim(value) for key, value in drawn.items()}
+
+
+def _with_short_names(own: Table | Words | Chooser) -> Table | Words | Chooser:
+    """Return a table or a choice of cases without the words that long names have in common; its heading has them."""
+    if isinstance(own, Table) and own.rows and list(own.head[:1]) == [CASE]:
+        heading, names = shortened([row[0] for row in own.rows])
+        rows = [[name, *row[1:]] for name, row in zip(names, own.rows, strict=True)]
+        return replace(own, head=[heading, *own.head[1:]], rows=rows)
+    if isinstance(own, Chooser) and own.heading == CASE:
+        heading, names = shortened([case.short for case in own.cases])
+        cases = tuple(replace(case, label=name) for case, name in zip(own.cases, names, strict=True))
+        return replace(own, heading=heading, cases=cases)
+    return own
 
 
 def _kind(own: Table | Words | Chooser) -> Kind:

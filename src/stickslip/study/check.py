@@ -24,6 +24,7 @@ SECTIONS = {
 }  # field of `Advice` -> heading
 DOUBTFUL = "doubtful"
 START_S = 5.0  # of CPU: imports and compiled functions; `check` of four masses takes 5.6 s in all (28 Nov 2026)
+NAMED_CASES = 8  # cases that a line names
 NO_DOUBT = "nothing that can be seen without solving"
 
 
@@ -62,7 +63,8 @@ def check_study(study: Study) -> tuple[str, ...]:
     if measured is not None:
         LOG.info(measured.sentence)
     if alike:
-        LOG.info(f"the same holds for: {together(alike)}")
+        others = f"the other {len(alike)} cases" if len(alike) > NAMED_CASES else together(alike)
+        LOG.info(f"the same holds for: {others}")
     if len(study.cases()) > 1 and solving_s[1] > 0.0:
         least, most = (f"{s / 60:.0f} min" if s >= 120.0 else f"{s:.0f} s" for s in solving_s)
         LOG.info(f"all {len(study.cases())} cases: {least} to {most} to solve on one core")

@@ -147,14 +147,16 @@ def together(labels: Sequence[str]) -> str:
 def _by_parts(labels: Sequence[tuple[str, ...]]) -> str:
     """Join names that have several parts.
 
-    If the names are all combinations of their parts, return the values of each part that differs, then the common parts.
+    If the names are all combinations of their parts, return the values of each part that differs, then the common parts. Else they are
+    split by the values of that part which gives the shortest text.
     """
-    plain = "; ".join(JOINT.join(parts) for parts in labels)
-    if len({len(parts) for parts in labels}) > 1:
-        return plain
+    if len(labels) == 1 or len({len(parts) for parts in labels}) > 1:
+        return "; ".join(JOINT.join(parts) for parts in labels)
     columns = [list(dict.fromkeys(column)) for column in zip(*labels, strict=True)]
     if set(labels) != set(product(*columns)):
-        return plain
+        several = [k for k, values in enumerate(columns) if len(values) > 1]
+        split = ("; ".join(_by_parts([own for own in labels if own[k] == v]) for v in columns[k]) for k in several)
+        return min(split, key=len)
     differing = WITH.join(together(values) for values in columns if len(values) > 1)
     same = JOINT.join(values[0] for values in columns if len(values) == 1)
     return f"{differing}, each{WITH}{same}" if same else differing
@@ -196,10 +198,11 @@ def in_lines(verdicts: Iterable[Verdict], *, every: bool = False) -> list[str]:
     """
     if every:
         return [str(v) for v in worst_first(once(verdicts))]
-    lines = []
-    for first, *others in of_kinds(verdicts):
+    every_verdict, lines = list(verdicts), []
+    trusted = list(dict.fromkeys(v.case for v in every_verdict if v.case and not v.told))
+    for first, *others in of_kinds(every_verdict):
         if first.case and not first.told and others:
-            lines.append(f"TRUSTED: {together([v.case for v in (first, *others)])}.")
+            lines.append(f"TRUSTED: {together(trusted)}.")
         else:
             lines.append(f"{first} {likewise(others)}".rstrip())
     return lines

@@ -13,7 +13,7 @@ from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.waves.records import hertz
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, families_of, first_number, without_common_words
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.content import Chooser, Table, Words, chooser
 from stickslip.report.frame import Chapter, Conclusion, Placing, concluded, page_html
 from stickslip.report.plot import BROKEN, COLOURS, DASHES, INK, MUTED, Plot, log_ticks, styled
@@ -30,6 +30,7 @@ from stickslip.report.quantities import (
     scale_for,
 )
 from stickslip.report.section import Card, Content
+from stickslip.study.file.case_names import without_common_words
 from stickslip.study.varied import naming_of
 from stickslip.study.verdict import JOINT, POINT_LEVELS, UNSTABLE, conclusion, not_trusted, of_tree
 

@@ -9,6 +9,8 @@ from stickslip.study.file.suffixes import split_units
 
 Values = Mapping[str, Any]  # varied key -> value
 JOINT = ", "  # separator of the parts of a name
+CASE = "case"  # heading of legends and columns
+LONG = 24  # letters of a name that a column has room for
 DIGITS, MOST_DIGITS = 6, 17  # usual and largest number of digits of a value
 LEAST_SHOWN, MOST_SHOWN = 0.1, 1e4  # outside of these a number is easier to read with another prefix of its unit
 # unit of a key -> units with other prefixes that engineers write, with the power of ten of their numbers
@@ -181,3 +183,29 @@ def _digits(values: Sequence[Any]) -> int:
     """Return the smallest number of digits with which different numbers have different texts."""
     every = _told_apart(values, MOST_DIGITS)
     return next((n for n in range(DIGITS, MOST_DIGITS) if _told_apart(values, n) == every), MOST_DIGITS)
+
+
+def without_common_words(names: Sequence[str]) -> tuple[str, list[str]]:
+    """Split names that begin alike in all their parts: ``force 2 N, mu 0.3`` and others -> ``force, mu`` and ``2 N, 0.3`` and others.
+
+    The first result is empty, and the names are whole, if they have no common words.
+    """
+    rows = [[part.split(" ") for part in name.split(JOINT)] for name in names]
+    if len({len(row) for row in rows}) != 1 or len(names) < 2 or any("=" in name for name in names):
+        return "", list(names)
+    common = []
+    for parts in zip(*rows, strict=True):
+        words = [same.pop() for same in map(set, zip(*(part[:-1] for part in parts), strict=False)) if len(same) == 1]
+        alike = all(part[: len(words)] == words for part in parts)
+        common.append(words if alike and len(set(map(tuple, parts))) > 1 else [])
+    title = JOINT.join(" ".join(words) for words in common if words)
+    short = [JOINT.join(" ".join(part[len(w) :]) for part, w in zip(row, common, strict=True)) for row in rows]
+    return title, short
+
+
+def shortened(names: Sequence[str]) -> tuple[str, list[str]]:
+    """Return a heading and names for a column or a list of cases; long names lose the words that they have in common."""
+    if max(map(len, names), default=0) <= LONG:
+        return CASE, list(names)
+    title, short = without_common_words(names)
+    return title or CASE, short

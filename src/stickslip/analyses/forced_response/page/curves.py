@@ -15,9 +15,10 @@ from stickslip.analyses.forced_response.page.tractions import draw_bands
 from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
-from stickslip.report.cases import CASE, ShownCase
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, DASHES, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
+from stickslip.study.file.case_names import CASE
 from stickslip.study.verdict import POINT_LEVELS
 
 COMPARED = 3  # legible curves in one panel
@@ -311,7 +312,8 @@ def frequency_response(response: Response) -> Plot | None:
     if response.decides:
         low, more = response.low_name, response.more_name
         figure.add_trace(key_marker(f"H = {low}", "circle", group, title))
-        figure.add_trace(key_marker(more, "diamond", group))
+        if np.any(response.converged & response.more):
+            figure.add_trace(key_marker(more, "diamond", group))
     for level, word, symbol in ((1, "doubtful", "circle-open"), (2, "wrong", "x")):
         if np.any(response.converged & (response.levels == level)):
             figure.add_trace(key_marker(word, symbol, group))

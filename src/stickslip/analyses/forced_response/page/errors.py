@@ -8,9 +8,10 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.forced_response.page.curves import COMPARED, most
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import CASE, ShownCase
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, INK, Plot, log_ticks, ring, styled
 from stickslip.report.quantities import counted, number, percent
+from stickslip.study.file.case_names import CASE
 
 _SMALLEST_INDICATOR = 1e-8
 _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding

@@ -9,10 +9,10 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import ShownCase, families_of, first_number, without_common_words
+from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.plot import COLOURS, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, number, scale_for
-from stickslip.study.file.case_names import Naming
+from stickslip.study.file.case_names import Naming, without_common_words
 from stickslip.study.varied import as_number, naming_of, varied_values
 
 FEW = 8  # largest number of cases in the legend of a panel

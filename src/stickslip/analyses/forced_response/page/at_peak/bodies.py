@@ -9,16 +9,18 @@ from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.many_cases import FEW, extremes
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import CASE, ShownCase
+from stickslip.report.cases import ShownCase
 from stickslip.report.content import Words
 from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
+from stickslip.study.file.case_names import CASE
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 ENERGY = "Energy dissipated in a cycle"
 _STILL = "At the peak nothing is dissipated: no point slips."
 _NO_POINT = "No point dissipates energy at any frequency."
 _NOTHING = 1e-12  # J a cycle: rounding error of newtons times micrometres
+_STAYS = 1e-6  # mean position along an axis over the largest one or the motion, below which it is rounding
 _AXIS_LINES = (
     {"color": "#0072b2", "dash": "solid", "width": 2},
     {"color": "#d55e00", "dash": "dash", "width": 2},
@@ -65,7 +67,8 @@ def _caption(response: Response, case: ShownCase, at: list[int]) -> str:
     mean, motion = body_motion(response, case, at)
     largest = np.ptp(motion, axis=1) / 2
     move, turn = int(np.argmax(largest[:3])), int(np.argmax(largest[3:]))
-    means = ", ".join(f"{c} {quantity(float(m), 'm')}" for c, m in zip("xyz", mean[:3], strict=True))
+    seen = np.where(np.abs(mean[:3]) > _STAYS * max(np.abs(mean[:3]).max(), largest[move]), mean[:3], 0.0)
+    means = ", ".join(f"{c} {quantity(float(m), 'm')}" for c, m in zip("xyz", seen, strict=True))
     return (
         f"Largest translation {quantity(float(largest[move]), 'm')} along {'xyz'[move]}, largest rotation "
         f"{quantity(float(largest[3 + turn]), 'rad')} about {'xyz'[turn]} (half of peak to peak). Mean position, taken "

@@ -9,11 +9,12 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.report.cases import CASE, ShownCase
+from stickslip.report.cases import ShownCase
 from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, legend_above, styled
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.tiles import outlines, patches
+from stickslip.study.file.case_names import CASE
 
 _ROUNDING = 1e-9  # area of a loop over the area of its bounding box, below which it is a line
 SHOWN_LOOPS = 6  # panels shown, of the points that dissipate most; the others are folded away
@@ -287,7 +288,9 @@ def state_map(response: Response) -> Plot | None:
     caption = "Each row is a contact point in one tangential direction, through one cycle from left to right."
     captions = {c.index: _state_caption(response, c, rows) for c in cases}
     title = "Contact states over one period at the peak"
-    return Plot("states", title, caption, figure, captions, response.chosen)
+    still = not any(np.any(states(response, c).reshape(-1, states(response, c).shape[-1])[rows]) for c in cases)
+    folded = "Contact states over one period at the peak: all stick" if still else ""
+    return Plot("states", title, caption, figure, captions, response.chosen, folded=folded)
 
 
 MIN_MAP_POINTS = 9  # least number of points for a map of a surface
