@@ -10,16 +10,23 @@ from pathlib import Path
 import numpy as np
 import scipy.linalg
 
-from evidence.validation.calculix import MISSING, available, run_deck
+from evidence.models.annulus import annular_sector
+from evidence.validation.calculix import MISSING, available, frequencies_hz, run_deck
+from evidence.validation.calculix_stored import lowest_frequencies
 from evidence.validation.case_calculix_matrices_at_speed import frequencies
 from evidence.validation.compare import Record, left_out, record
 from stickslip.arrays import FloatArray
+from stickslip.model.deck import CalculixRun, write_deck
+from stickslip.model.fe.material import Material
+from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.readers.calculix_deck import assemble_deck, read_deck
 from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic import cyclic_sector
 
 SOURCE = "CalculiX, run on a deck that we wrote"
 DIGITS = 1e-6
 MODES = 6
+SECTORS = 12
 EDGES = ((0, 1), (1, 2), (3, 2), (0, 3), (4, 5), (5, 6), (7, 6), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7))
 CORNERS = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2))
 MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1E11, 0.3\n*DENSITY\n7850.\n*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL\n"
@@ -114,6 +121,44 @@ def our_frequencies(structure: Structure) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi))
 
 
+def sector_deck(path: Path, speed: float) -> None:
+    """Write a sector of a ring with equations between nodes away from its faces; at rest with a rigid tip and a point mass, too."""
+    mesh = annular_sector(0.2, 0.3, 0.02, sectors=SECTORS, divisions=(3, 4, 1))
+    faces = np.concatenate([mesh.node_sets[name] for name in ("cyclic_low", "cyclic_high", "root")])
+    free = np.setdiff1d(np.arange(len(mesh.points)), faces)
+    numbers = (free + 1).tolist()
+    outer = free[np.argsort(-np.hypot(*mesh.points[free, :2].T), kind="stable")][:6] + 1
+    cards = f"*EQUATION\n3\n{numbers[3]}, 1, 1., {numbers[10]}, 2, -0.7, {numbers[20]}, 1, -0.4\n"
+    cards += f"*EQUATION\n2\n{numbers[-2]}, 3, 1., {numbers[20]}, 3, -1.5\n"
+    if speed == 0.0:
+        cards += "*NODE\n90001, 0.33, 0.02, 0.01\n*ELEMENT, TYPE=MASS, ELSET=M\n90001, 90001\n*MASS, ELSET=M\n0.4\n"
+        cards += "*NSET, NSET=RIGID\n" + "".join(f"{n},\n" for n in outer) + "*RIGID BODY, NSET=RIGID, REF NODE=90001\n"
+    run = CalculixRun(n_modes=4, nodal_diameters=(0, 3), speed=speed)
+    write_deck(mesh, Material(), path, sectors=SECTORS, run=run)
+    path.write_text(path.read_text().replace("*STEP", f"{cards}*STEP", 1))
+
+
+def of_sector(path: Path, speed: float) -> list[Record]:
+    """Compare the frequencies of a sector with equations, nodal diameter by nodal diameter."""
+    sector_deck(path, speed)
+    printed = frequencies_hz(run_deck(path))
+    deck = read_deck(path)
+    solid = rotating_solid(deck.mesh, deck.material, deck.axis, quadrature=deck.quadrature, links=deck.links)
+    tie = cyclic_sector(solid.structure, SECTORS, axis=deck.axis).tie
+    state = solid.at_speed(speed, tie=tie) if speed else solid.structure
+    sector = cyclic_sector(state, SECTORS, axis=deck.axis)
+    case = (
+        f"a sector with equations at {speed:g} rad/s" if speed else "a sector with equations and a rigid tip, at rest"
+    )
+    records = []
+    for diameter, theirs in printed.items():
+        ours = lowest_frequencies(state, sector.wave_tie(diameter), len(theirs))
+        worst = int(np.argmax(np.abs(ours / theirs - 1)))
+        quantity = f"nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
+        records.append(record(case, quantity, ours[worst], theirs[worst], DIGITS, SOURCE))
+    return records
+
+
 def run() -> list[Record]:
     """Compare frequencies deck by deck; without CalculiX the comparison is left out."""
     if not available():
@@ -128,4 +173,6 @@ def run() -> list[Record]:
             worst = int(np.argmax(np.abs(ours / theirs - 1)))
             quantity = f"mode {worst + 1} (the worst of {len(theirs)}), Hz"
             records.append(record(case, quantity, ours[worst], theirs[worst], DIGITS, SOURCE))
+        for speed in (0.0, 600.0):
+            records += of_sector(Path(name) / f"s{speed:.0f}.inp", speed)
     return records

@@ -19,7 +19,7 @@ from stickslip.model.fe.links import Links, eliminate
 from stickslip.model.fe.material import AnyMaterial
 from stickslip.model.fe.solid import integrate, support
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.readers.deck_links import links_of_mesh
+from stickslip.model.readers.deck_links import SUPPORT, links_of_mesh
 from stickslip.model.readers.deck_materials import material_of, read_orientation
 from stickslip.model.readers.deck_model import DeckModel, interpret, unknown
 from stickslip.model.readers.deck_surfaces import couple, tie_faces
@@ -214,13 +214,14 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
 def _of_equations(links: Links, held: BoolArray) -> tuple[str, ...]:
     """Return which equations follow from others, and which hold a dof, for the user."""
     found = eliminate(links, held.ravel(), np.zeros(len(held), dtype=np.int64))
+    surplus, holding = (
+        [place for place in places if not place.endswith(SUPPORT)] for places in (found.surplus, found.holding)
+    )
     told = []
-    if found.surplus:
-        told.append(f"{len(found.surplus)} equations follow from others and the supports ({found.surplus[0]})")
-    if found.holding:
-        told.append(
-            f"{len(found.holding)} equations hold a node, together with others and the supports ({found.holding[0]})"
-        )
+    if surplus:
+        told.append(f"{len(surplus)} equations follow from others and the supports ({surplus[0]})")
+    if holding:
+        told.append(f"{len(holding)} equations hold a node, together with others and the supports ({holding[0]})")
     return tuple(told)
 
 

@@ -15,6 +15,7 @@ from stickslip.model.readers.units import Units
 
 # elements without volume, and their number of nodes
 POINT_KINDS = {"MASS": 1, "SPRINGA": 2, "SPRING1": 1, "SPRING2": 2, "DASHPOTA": 2, "DASHPOT1": 1, "DASHPOT2": 2}
+SUPPORT = "*BOUNDARY"  # end of the place of a support in turned axes
 ON_LINE = 1e-6  # distance from a line or a plane over the size of the constraint
 Term = tuple[int, int, float]  # node, direction 1 to 6, coefficient
 Vector = list[Term]
@@ -265,7 +266,10 @@ def _one_mpc(
         links.equations += [(place, [(numbers[0], d, 1.0), (numbers[1], d, -1.0)]) for d in (1, 2, 3)]
     elif kind in ("BEAM", "LINK"):
         along = points[1] - points[0]
-        row = _projected([(numbers[1], 1.0), (numbers[0], -1.0)], along / np.linalg.norm(along))
+        length = float(np.linalg.norm(along))
+        if length == 0.0:
+            raise input_error(place, f"nodes {numbers[:2]} lie at one place", "Tie them by equations.")
+        row = _projected([(numbers[1], 1.0), (numbers[0], -1.0)], along / length)
         links.linear(place, "a rigid bar")
         links.equations.append((place, row))
     else:

@@ -10,6 +10,7 @@ from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.deck_links import (
     POINT_KINDS,
+    SUPPORT,
     DeckLinks,
     read_equation,
     read_mpc,
@@ -231,6 +232,10 @@ def _connectivity(model: DeckModel, block: Block, count: int) -> Iterator[list[i
         row += [whole_number(text, place, "node") for text in fields if text]
         if len(row) > count:
             surplus += len(row) > count + 1
+            if min(row[: count + 1]) < 0:
+                raise input_error(
+                    place, f"an element has the number {min(row)}", "Check the line: numbers are positive."
+                )
             yield row[: count + 1]
             row = []
     if row:
@@ -316,7 +321,7 @@ def _hold(model: DeckModel, nodes: IntArray, first: int, last: int, place: str) 
     for direction in range(first, min(last, 6) + 1):
         if direction <= 3:
             model.fixed["xyz"[direction - 1]].append(plain)
-            links.supports += [(place, links.along(node, direction)) for node in turned]
+            links.supports += [(f"{place}, {SUPPORT}", links.along(node, direction)) for node in turned]
         else:
             links.held_angles |= {(int(node), direction) for node in nodes}
 

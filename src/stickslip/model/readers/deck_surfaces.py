@@ -183,7 +183,8 @@ def _nearest(
     middle = positions(points, facets, centres(facets))
     radius = np.where(facets >= 0, np.linalg.norm(points[facets] - middle[:, None], axis=2), 0.0).max(axis=1)
     point, near = near_pairs(points[rows], np.zeros(rows.size), middle, radius, reach)
-    reference, _ = closest(points, facets[near], points[rows[point]])
+    with np.errstate(divide="ignore", invalid="ignore"):  # a facet without area is near nothing
+        reference, _ = closest(points, facets[near], points[rows[point]])
     away = np.linalg.norm(points[rows[point]] - positions(points, facets[near], reference), axis=1)
     order = np.lexsort((away, point))
     best = order[np.unique(point[order], return_index=True)[1]]

@@ -177,8 +177,10 @@ def _listed(block: Block, sets: dict[str, list[IntArray]], known: IntArray) -> I
     what = "node" if block.keyword == "NSET" else "element"
     if "GENERATE" in block.parameters:
         for place, fields in block.rows():
+            if len(fields) < 2:
+                raise input_error(place, "needs first, last, step", "Give a step of at least 1.")
             first, last, step = (whole_number(f, place, what) for f in [*fields, "1"][:3])
-            if step < 1 or len(fields) < 2:
+            if step < 1:
                 raise input_error(place, "needs first, last, step", "Give a step of at least 1.")
             yield known[(known >= first) & (known <= last) & ((known - first) % step == 0)]
         return

@@ -16,6 +16,7 @@ from stickslip.model.readers.keywords import Block, keyword_blocks, members, uni
 from stickslip.model.readers.text import SHOWN, read_text, whole_numbers
 from stickslip.model.structure import Dofs
 
+LARGEST_COORDINATE = 1e50  # in any unit; squares of larger ones overflow
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of the solvers
 
 
@@ -127,6 +128,8 @@ def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
     if not tables:
         raise input_error(str(path), "has no *NODE", "Give the deck with the mesh.")
     table = np.vstack(tables)
+    if np.abs(table[:, 1:]).max(initial=0.0) > LARGEST_COORDINATE:
+        raise input_error(str(path), f"has a coordinate beyond {LARGEST_COORDINATE:g}", "Check the lines of *NODE.")
     numbers = whole_numbers(path, table, ("node number",))[:, 0]
     sets = members(blocks, "NSET", numbers, {name: np.concatenate(parts) for name, parts in named.items()})
     return node_table(numbers, table[:, 1:], str(path), sets)

@@ -176,7 +176,10 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
         remarks.append(f"one of {deck.sectors} sectors; frequencies with free cyclic faces")
     if deck.speed is not None:
         remarks.append(f"rotates at {deck.speed:.6g} rad/s; frequencies at rest")
+    of_matrices = list(found.remarks)
     if deck.links is not None:
+        # equations may resist a rigid rotation, and positions are the deck's own
+        of_matrices = [text for text in of_matrices if not text.startswith("Positions:")]
         held = np.count_nonzero(deck.held)
         remarks.append(f"{deck.mesh.points.size - held - structure.n} dofs follow others (equations, turned supports)")
     remarks += [*deck.told, *(f"passed over: {text}" for text in deck.ignored)]
@@ -188,7 +191,7 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
         nodes=shown.nodes,
         members=shown.members,
         box=shown.box,
-        remarks=(*remarks, *found.remarks),
+        remarks=(*remarks, *of_matrices),
     )
 
 
