@@ -97,9 +97,9 @@ def test_a_misspelt_keyword_of_a_material_is_named(tmp_path: Path) -> None:
 
 def test_remedies_are_options_and_keys_not_arguments(tmp_path: Path) -> None:
     deck = write_deck(tmp_path / "deck.inp")
-    deck.write_text(deck.read_text() + "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n")
+    deck.write_text(deck.read_text() + "*SUBMODEL\n")
     said = refused("check", str(file_study(tmp_path)))
-    assert "*EQUATION changes the model and is not read. Let the solver write its matrices and read these." in said
+    assert "*SUBMODEL changes the model and is not read. Let the solver write its matrices and read these." in said
     assert "ignore" not in said + refused("inspect", str(deck))
     (tmp_path / "job.sti").write_text("1 1 1.0\n")
     (tmp_path / "job.dof").write_text("1.1\n")
