@@ -197,8 +197,8 @@ def test_a_free_solid_at_speed_is_in_balance_with_its_inertia() -> None:
     tie = model.neighbours.ties["ring"]
     assert rigid_motions(whole).shape[1] == 6
     assert rigid_motions(part.solid, tie).shape[1] == 2  # along the axis and about it
-    moved, carried = inertia_relief(whole)
-    of_sector, nothing = inertia_relief(part.solid, tie)
+    moved, carried, _ = inertia_relief(whole)
+    of_sector, nothing, _ = inertia_relief(part.solid, tie)
     load = whole.centrifugal
     assert np.abs(whole.structure.stiffness @ moved - load + carried).max() < 1e-9 * np.abs(load).max()
     assert max(np.abs(carried).max(), np.abs(nothing).max()) < 1e-9 * np.abs(load).max()

@@ -18,6 +18,7 @@ from stickslip.analyses.waves.records import Wheel
 from stickslip.analyses.waves.solve import Question, solve_wave
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.prestress import strain_and_rotation
 from stickslip.model.fe.solid import Material
 from stickslip.model.gyroscopic import gyroscopic_modes
@@ -259,7 +260,7 @@ def test_strain_and_rotation_of_a_linear_field(joined: Joined) -> None:
     assert mesh is not None
     strain = 1e-3 * np.array([[2.0, 1.0, 0.0], [1.0, -5.0, 0.5], [0.0, 0.5, 1.0]])
     turn = 1e-3 * np.cross(np.eye(3), [1.0, 2.0, -2.0])  # of length three
-    found = strain_and_rotation(mesh, mesh.points @ (strain + turn).T)
+    found = strain_and_rotation(cell_laws(mesh, Material()), mesh.points @ (strain + turn).T)
     expected = np.abs(np.linalg.eigvalsh(strain)).max(), 3e-3
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 

@@ -285,7 +285,7 @@ def _free_dofs(model: Model) -> IntArray:
 def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> HarmonicLoad:
     """Return the load on the coordinates: static forces, including steady rotation, and harmonics."""
     static = np.zeros(linear.side.n)
-    if model.centrifugal and model.speed > 0:
+    if model.loads_steadily:
         static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
     harmonics: dict[int, Matrix] = {}
     for name, force in forces.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Skin
-from stickslip.assembly.contact import Contact, Join
+from stickslip.assembly.contact import ALONE, Contact, Join
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.forces import Load, Output, beyond_sectors, doubtful_fields, engine_order, far_outputs
 from stickslip.assembly.joints.pairs import Pairs, pair_contacts
@@ -17,7 +17,7 @@ from stickslip.assembly.joints.surface_checks import refuse_contacts_of_dofs, re
 from stickslip.assembly.joints.ties import Coordinates, Ties, coordinates, tie_joins
 from stickslip.assembly.joints.untied_faces import uncoupled, untied_faces
 from stickslip.assembly.locations import Places, picked
-from stickslip.assembly.part_reduction import Spin, Steady, at_speed, damped, steady_of
+from stickslip.assembly.part_reduction import Spin, Steady, at_speed, damped, is_loaded, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning
 from stickslip.assembly.sides.wheel import Neighbours, is_staged, neighbours, stages_of, with_joins
 from stickslip.assembly.skin import on_skin, skin_of
@@ -175,6 +175,29 @@ class Model:
         return any(part.turning is not None for part in self.parts.values())
 
     @property
+    def heated(self) -> bool:
+        """Whether thermal strain loads a part."""
+        return any(part.solid is not None and part.solid.heated for part in self.parts.values())
+
+    @property
+    def loads_steadily(self) -> bool:
+        """Whether rotation or thermal strain is a static load.
+
+        Raises
+        ------
+        InputError
+            If thermal strain is one and the centrifugal load of a rotating model is not.
+        """
+        turns = self.speed > 0
+        if self.heated and turns and not self.centrifugal:
+            raise input_error(
+                "rotation.centrifugal",
+                "is false, but parts have thermal strain, which loads the model together with the speed",
+                "Leave it out, or take a uniform temperature without expansion.",
+            )
+        return self.heated or (self.centrifugal and turns)
+
+    @property
     def _has_mesh(self) -> bool:
         return any(part.solid is not None for part in self.parts.values())
 
@@ -197,7 +220,10 @@ class Model:
     @cached_property
     def stages(self) -> Multistage | None:
         """Wheels of a model whose joins couple several by spatial harmonics; None otherwise."""
-        return stages_of(self.places, self.joins, self.contacts, self.speed * self.rotates)
+        found = stages_of(self.places, self.joins, self.contacts, self.speed * self.rotates)
+        if found is not None and self.heated:
+            raise input_error("temperature", "strains stages that are coupled by spatial harmonics", ALONE)
+        return found
 
     @cached_property
     def neighbours(self) -> Neighbours | None:
@@ -367,11 +393,11 @@ class Model:
         return on_skin(self.places, field)
 
     def static_displacement(self, speed: float) -> dict[str, FloatArray]:
-        """Return the (nodes, 3) static displacements in m of the meshes of rotating parts at a speed in rad/s; none at rest."""
+        """Return the (nodes, 3) static displacements in m of the meshes that rotate at a speed in rad/s or are heated."""
         return {
             name: part.solid.at_nodes(self.steady[name].displacement(part, speed))
             for name, part in self.parts.items()
-            if part.solid is not None and speed > 0
+            if part.solid is not None and is_loaded(part, speed)
         }
 
     def static_state(self, speed: float) -> StaticState | None:

@@ -9,6 +9,7 @@ import scipy
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.material import moved_materials
 from stickslip.model.fe.rotation import RotatingSolid, with_inner_inertia
 from stickslip.model.mesh.solid_mesh import SolidMesh, mirrored_cells
@@ -155,9 +156,8 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
     arm = solid.axis.arm(mesh.points)
     load: FloatArray = solid.nodal_mass @ arm
     material = moved_materials(solid.material, place.turn, place.move)
-    inner = with_inner_inertia(
-        scipy.sparse.csr_array((arm.size, arm.size)), mesh, material, solid.quadrature, np.eye(3)
-    )
+    laws = cell_laws(mesh, material, solid.temperature)
+    inner = with_inner_inertia(scipy.sparse.csr_array((arm.size, arm.size)), laws, solid.quadrature, np.eye(3))
     load = load.ravel() + inner @ arm.ravel() if inner.nnz else load.ravel()
     followers = None
     if solid.followers is not None:
@@ -175,4 +175,5 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
         load[solid.moving] if followers is None else np.asarray(followers.T @ load),
         followers,
         solid.small,
+        solid.temperature,
     )

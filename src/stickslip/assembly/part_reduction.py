@@ -59,7 +59,7 @@ class Spin:
 
 @dataclass(frozen=True, eq=False)
 class Steady:
-    """Conditions of the displacement of a part in steady rotation.
+    """Conditions of the displacement of a part in steady rotation and temperature.
 
     Parameters
     ----------
@@ -71,21 +71,29 @@ class Steady:
     carried
         (n,) force over the square of the speed, N s², that contacts carry if they alone support the part; None for a
         supported part.
+    hot
+        (n,) displacement by the thermal strain in m, where `unit` is given; None without thermal strain.
     """
 
     tie: Matrix | None = None
     unit: FloatArray | None = None
     carried: FloatArray | None = None
+    hot: FloatArray | None = None
 
     def displacement(self, part: Part, speed: float) -> FloatArray:
         """Return the (n,) displacement in m of a part with a solid at a speed in rad/s."""
         assert part.solid is not None
         if self.unit is not None:
-            return np.asarray(speed**2 * self.unit)
+            return np.asarray(speed**2 * self.unit + (0.0 if self.hot is None else self.hot))
         return part.solid.displacement(speed, tie=self.tie)
 
 
 ALONE = Steady()
+
+
+def is_loaded(part: Part, speed: float) -> bool:
+    """Whether a part of finite elements has a static state: it rotates, or thermal strain loads it."""
+    return part.solid is not None and (speed != 0.0 or part.solid.heated)
 
 
 def steady_of(part: Part, tie: Matrix | None) -> Steady:
@@ -138,11 +146,11 @@ def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structu
             return part.turning.at_speed(spin.speed, coriolis=spin.coriolis)
         except InputError as error:
             raise error.inside(f"part.{name}") from None
-    if part.solid is None or spin.speed == 0.0:
+    if part.solid is None or not is_loaded(part, spin.speed):
         return part.structure
     try:
         return part.solid.at_speed(
-            spin.speed, tie=rest.tie, unit=rest.unit, tangent=spin.tangent, coriolis=spin.coriolis
+            spin.speed, tie=rest.tie, unit=rest.unit, hot=rest.hot, tangent=spin.tangent, coriolis=spin.coriolis
         )
     except SingularError as error:
         raise SingularError(f"part.{name}: {error}") from None
@@ -156,7 +164,7 @@ def stiffening(part: Part, spin: Spin, rest: Steady = ALONE) -> Matrix:
         return part.turning.by_square(spin.speed)
     if part.solid is None:
         return scipy.sparse.csr_array((part.structure.n, part.structure.n))
-    found = part.solid.polynomial(rest.tie, tangent=spin.tangent, unit=rest.unit)
+    found = part.solid.polynomial(rest.tie, tangent=spin.tangent, unit=rest.unit, hot=rest.hot)
     return found.by_square(spin.speed)
 
 
@@ -164,7 +172,7 @@ def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALO
     """Return the (n,) load on a part's dofs that causes the displacement of steady rotation at a speed, N."""
     if part.turning is not None:
         return part.turning.static_load(spin.speed)
-    if part.solid is None or spin.speed == 0.0:
+    if not is_loaded(part, spin.speed):
         return np.zeros(part.structure.n)
     load = np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
     return load if rest.carried is None else load + spin.speed**2 * rest.carried
@@ -225,7 +233,7 @@ def reduced_parts(
     found = {}
     for name, part in parts.items():
         root = _root(part, spin, rest[name])
-        steady = rest[name] if root.solid is not None and spin.speed != 0.0 else ALONE
+        steady = rest[name] if is_loaded(root, spin.speed) else ALONE
         made = _reduced(name, root, wanted[id(root)], (spin, steady), store)
         found[name] = made if root is part else _placed(made, part)
     return found
@@ -235,7 +243,7 @@ def _root(part: Part, spin: Spin, rest: Steady) -> Part:
     """Return the part whose reduction a part shares."""
     if part.template is None or part.place is None or part.body is not None:
         return part
-    turns = part.follows_speed and spin.speed != 0.0
+    turns = (part.follows_speed and spin.speed != 0.0) or is_loaded(part, spin.speed)
     alike = part.place.keeps(part.axis) and rest.unit is None
     return part if turns and not alike else part.template
 
@@ -243,7 +251,7 @@ def _root(part: Part, spin: Spin, rest: Steady) -> Part:
 def _reduced(name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store) -> ReducedPart:
     changes = part.follows_speed or part.body is not None
     spin, rest = turning if changes else (Spin(), ALONE)
-    shared = None if rest.unit is None else rest.unit.tobytes()
+    shared = None if rest.unit is None else rest.unit.tobytes() + (b"" if rest.hot is None else rest.hot.tobytes())
     whole = store is with_ways_back
     key = (spin, shared, kept.tobytes(), whole)
     if whole and part.memo.get(LAST, (None,))[0] == key:
@@ -327,10 +335,11 @@ def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
     turning: tuple[object, ...] = ()
     if part.turning is not None and spin.speed != 0.0:
         turning = (spin, part.turning)
-    if solid is not None and spin.speed != 0.0:
+    if solid is not None and is_loaded(part, spin.speed):
         mesh, material = solid.mesh, solid.material
         given = (material,) if not isinstance(material, list | tuple) else tuple(material)
-        turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature, solid.followers)
+        state = (spin, rest.unit, rest.hot, solid.temperature)
+        turning = (*state, mesh.points, mesh.cells, given, solid.axis, solid.quadrature, solid.followers)
     return content_hash("reduced", part.structure, kept, part.reduction, part.damping, turning)
 
 

@@ -45,11 +45,26 @@ def joined_displacements(
     moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
     tie = scipy.sparse.csr_array(tie[:, moves])
     stiffness = scipy.sparse.block_diag([scipy.sparse.csr_array(part.structure.stiffness) for part in parts.values()])
-    load = [_centrifugal(part) for part in parts.values()]
     solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
-    moved = tie @ solve(tie.T @ np.concatenate(load))
-    shared = {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}
+    moved, hot = (
+        None if load is None else np.asarray(tie @ solve(tie.T @ load))
+        for load in (np.concatenate([_centrifugal(part) for part in parts.values()]), _thermal(parts))
+    )
+    assert moved is not None
+    shared = {
+        name: Steady(unit=moved[places.own(name)], hot=None if hot is None else hot[places.own(name)]) for name in parts
+    }
     return shared | free
+
+
+def _thermal(parts: Mapping[str, Part]) -> FloatArray | None:
+    """Return the (N,) forces of the thermal strain on the dofs of all parts, N; None without thermal strain."""
+    own = {name: None if part.solid is None else part.solid.thermal_load for name, part in parts.items()}
+    if all(load is None for load in own.values()):
+        return None
+    return np.concatenate(
+        [np.zeros(part.structure.n) if (load := own[name]) is None else load for name, part in parts.items()]
+    )
 
 
 def _centrifugal(part: Part) -> FloatArray:
@@ -74,7 +89,7 @@ def _free_solids(places: Places, here: Neighbours | None, joins: Ties) -> dict[s
 
 @dataclass(frozen=True)
 class StaticState:
-    """Static deformation of a model's solids under the centrifugal load, by linear statics without contacts.
+    """Static deformation of a model's solids under the centrifugal load and heat, by linear statics without contacts.
 
     Parameters
     ----------
@@ -83,7 +98,7 @@ class StaticState:
     displacement
         Largest displacement of a node, m.
     strain
-        Largest magnitude of a principal strain at the element centres.
+        Largest magnitude of a principal strain at the element centres, without free thermal strain.
     rotation
         Largest rotation at the element centres, rad.
     radius
@@ -116,9 +131,10 @@ def static_state(parts: Mapping[str, Part], displacement: Mapping[str, FloatArra
     for name, moved in displacement.items():
         part = parts[name]
         assert part.mesh is not None
+        assert part.solid is not None
         length = float(np.linalg.norm(moved, axis=1).max())
         radius = float(np.linalg.norm(part.axis.arm(part.mesh.points), axis=1).max())
-        rows.append((length, *strain_and_rotation(part.mesh, moved), radius))
+        rows.append((length, *strain_and_rotation(part.solid.laws, moved), radius))
     if not rows:
         return None
     return StaticState(speed, *(float(v) for v in np.max(np.array(rows), axis=0)))

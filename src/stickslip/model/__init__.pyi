@@ -10,9 +10,11 @@ from .deck import write_deck as write_deck
 from .fe.beam import Beam as Beam
 from .fe.beam import beam as beam
 from .fe.beam import rotating_beam as rotating_beam
+from .fe.cell_laws import Temperature as Temperature
 from .fe.elements import Quadrature as Quadrature
 from .fe.material import ByTemperature as ByTemperature
 from .fe.material import ElasticMaterial as ElasticMaterial
+from .fe.material import Expansion as Expansion
 from .fe.material import Orientation as Orientation
 from .fe.material import elastic_material as elastic_material
 from .fe.material import orthotropic_stiffness as orthotropic_stiffness

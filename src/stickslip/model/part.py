@@ -10,6 +10,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
+from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.elements import EXACT, Rules
 from stickslip.model.fe.links import Links
 from stickslip.model.fe.material import Materials
@@ -248,6 +249,7 @@ def solid_part(
     clamped: tuple[str, ...] = ("root",),
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
+    temperature: Temperature | None = None,
     links: Links | None = None,
     **others: Any,
 ) -> Part:
@@ -255,12 +257,21 @@ def solid_part(
 
     Parameters
     ----------
-    mesh, material, axis, clamped, held, quadrature, links
+    mesh, material, axis, clamped, held, quadrature, temperature, links
         As in `rotating_solid`.
     **others
         Further fields of `Part`: ``sectors``, ``faces``, ``reduction``, ``damping``, ``warnings``.
     """
-    solid = rotating_solid(mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature, links=links)
+    solid = rotating_solid(
+        mesh,
+        material,
+        axis,
+        clamped=clamped,
+        held=held,
+        quadrature=quadrature,
+        links=links,
+        temperature=temperature,
+    )
     return Part(structure=solid.structure, mesh=mesh, solid=solid, axis=axis, **others)
 
 

@@ -15,7 +15,9 @@ ROUNDING_FORCE = 1e-9  # force on a dof over the sum of its terms' magnitudes: l
 MISMATCH = 2e-4
 
 
-def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[FloatArray, FloatArray] | None:
+def inertia_relief(
+    solid: RotatingSolid, tie: Matrix | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray | None] | None:
     """Return the static displacement of a free solid under its centrifugal load, in balance with its own inertia.
 
     The load minus the inertia of the rigid motions that it would cause is in equilibrium and deforms the solid. Contacts carry the
@@ -30,9 +32,10 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
 
     Returns
     -------
-    tuple[FloatArray, FloatArray] | None
-        (n,) displacement at 1 rad/s in m s², without rigid motion, and the (n,) load in N s² that contacts must carry; None if
-        supports prevent rigid motion.
+    tuple[FloatArray, FloatArray, FloatArray | None] | None
+        (n,) displacement at 1 rad/s in m s², without rigid motion, the (n,) load in N s² that contacts must carry, and the (n,)
+        displacement by thermal strain in m, without rigid motion (None without thermal strain); None if supports prevent rigid
+        motion.
 
     Raises
     ------
@@ -46,18 +49,22 @@ def inertia_relief(solid: RotatingSolid, tie: Matrix | None = None) -> tuple[Flo
     weighted = mass @ free
     square = free.T @ weighted
     carried = weighted @ np.linalg.solve(square, free.T @ solid.centrifugal)
-    load = solid.centrifugal - carried
+    loads = [solid.centrifugal - carried, *([] if solid.thermal_load is None else [solid.thermal_load])]
     own = free
     if tie is not None:
-        load, own = tie.T @ load, _on(tie, free)
+        loads, own = [tie.T @ load for load in loads], _on(tie, free)
         stiffness = tie.T @ stiffness @ tie
     # as many coordinates are held as there are rigid motions: the load is in equilibrium, so reactions vanish
     _, _, order = scipy.linalg.qr(own.T, mode="economic", pivoting=True)
     rest = np.sort(order[own.shape[1] :])
-    moved = np.zeros(own.shape[0])
-    moved[rest] = _held(scipy.sparse.csr_array(stiffness)[rest][:, rest])(load[rest])
-    moved = moved if tie is None else np.asarray(tie @ moved)
-    return moved - free @ np.linalg.solve(square, weighted.T @ moved), carried
+    solve = _held(scipy.sparse.csr_array(stiffness)[rest][:, rest])
+    found = []
+    for load in loads:
+        moved = np.zeros(own.shape[0])
+        moved[rest] = solve(load[rest])
+        moved = moved if tie is None else np.asarray(tie @ moved)
+        found.append(moved - free @ np.linalg.solve(square, weighted.T @ moved))
+    return found[0], carried, found[1] if len(found) > 1 else None
 
 
 def _held(stiffness: Matrix) -> Solve:

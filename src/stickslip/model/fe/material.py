@@ -13,6 +13,7 @@ from stickslip.units import check_quantities, quantity
 
 # components of strain and stress vectors; shear strains are doubled
 PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
+TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # places of a tensor's components in a vector
 SQUARE = 1e-9  # least eigenvalue of an elasticity matrix over its largest
 
 
@@ -177,6 +178,69 @@ class ByTemperature:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Expansion:
+    """Thermal expansion over temperature.
+
+    Parameters
+    ----------
+    coefficients
+        Rows of 1 number (isotropic), 3 (along the axes of the material) or 6 (order 11, 22, 33, 12, 23, 13) in 1/K.
+    kind
+        ``"secant"``: the strain from `zero` to a temperature is the coefficient there times the difference of temperature;
+        ``"instantaneous"``: the coefficient is the derivative of the strain.
+    zero
+        Temperature from which secant coefficients count; None if there is one coefficient for all temperatures.
+
+    Raises
+    ------
+    InputError
+        If secant coefficients over temperature have no `zero`, or rows have another length.
+    """
+
+    coefficients: ByTemperature
+    kind: Literal["secant", "instantaneous"] = "secant"
+    zero: float | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.coefficients.values[0]) not in (1, 3, 6):
+            raise input_error("Expansion.coefficients", "has no rows of 1, 3 or 6 numbers", "Give 1/K for each axis.")
+        if self.kind == "secant" and self.coefficients.varies and self.zero is None:
+            raise input_error(
+                "Expansion.zero",
+                "is missing with secant coefficients over temperature",
+                "Give the temperature from which they count.",
+            )
+
+    def strain(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Return the strain (..., 6) in the axes of the material, shears doubled, from temperatures `start` to `end` (...)."""
+        table = self.coefficients
+        if self.kind == "secant" or not table.varies:
+            zero = self.zero or 0.0
+            found = table.at(end) * (end - zero)[..., None] - table.at(start) * (start - zero)[..., None]
+        else:
+            found = _integral(table, end) - _integral(table, start)
+        whole = np.zeros((*found.shape[:-1], 6))
+        if found.shape[-1] == 1:
+            whole[..., :3] = found
+        else:
+            whole[..., : found.shape[-1]] = found
+        return whole
+
+
+def _integral(table: ByTemperature, to: FloatArray) -> FloatArray:
+    """Return the integral (..., k) of a table from its lowest temperature to temperatures (...)."""
+    at, rows = np.asarray(table.temperatures), np.asarray(table.values, dtype=float)
+    done = np.concatenate(
+        [np.zeros((1, rows.shape[1])), np.cumsum((rows[1:] + rows[:-1]) / 2 * np.diff(at)[:, None], axis=0)]
+    )
+    piece = np.clip(np.searchsorted(at, to, side="right") - 1, 0, len(at) - 1)
+    step = (to - at[piece])[..., None]
+    # within a piece the coefficient is linear, beyond the ends constant
+    middle = table.at((to + at[piece]) / 2)
+    return np.asarray(done[piece] + middle * step)
+
+
+@dataclass(frozen=True, kw_only=True)
 class ElasticMaterial:
     """A linear elastic material of any symmetry, in its own axes, whose properties may depend on temperature.
 
@@ -189,6 +253,8 @@ class ElasticMaterial:
         Rows of one number in kg/m³.
     orientation
         Axes 1, 2, 3 of the material.
+    expansion
+        Thermal expansion; None: none.
 
     Raises
     ------
@@ -199,6 +265,7 @@ class ElasticMaterial:
     elastic: ByTemperature
     density_table: ByTemperature
     orientation: Orientation = field(default_factory=Orientation)
+    expansion: Expansion | None = None
 
     def __post_init__(self) -> None:
         if not all(row[0] > 0 for row in self.density_table.values):
@@ -239,6 +306,23 @@ class ElasticMaterial:
     def matrices(self, temperature: FloatArray | None) -> FloatArray:
         """Return the matrices (..., 6, 6) from strains to stresses in the material's axes, Pa, at temperatures (...)."""
         return _matrix(self.elastic.at(temperature))
+
+    def fixed(self, temperature: float | None) -> "AnyMaterial":
+        """Return the material with the stiffness and density of one temperature, without expansion; isotropic if it can be.
+
+        Parameters
+        ----------
+        temperature
+            Temperature; None if nothing depends on it.
+        """
+        at = None if temperature is None else np.array(temperature)
+        row, density = self.elastic.at(at), float(self.density_table.at(at)[0])
+        if self.is_isotropic and 0 <= row[1] < 0.5:
+            return Material(young_modulus=float(row[0]), poisson_ratio=float(row[1]), density=density)
+        elastic = ByTemperature((tuple(float(v) for v in row),))
+        return ElasticMaterial(
+            elastic=elastic, density_table=ByTemperature(((density,),)), orientation=self.orientation
+        )
 
     def moved(self, turn: FloatArray, move: FloatArray) -> "ElasticMaterial":
         """Return the material of a body that is turned by the orthogonal (3, 3) `turn`, then moved by `move` (3,) in m."""

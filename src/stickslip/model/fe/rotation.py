@@ -4,7 +4,6 @@ In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -16,13 +15,13 @@ import scipy
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.cell_laws import cell_laws, laws_of_group
+from stickslip.model.fe.cell_laws import CellLaws, Temperature, cell_laws, laws_of_group
 from stickslip.model.fe.cell_matrices import hourglass_stiffness, inertia
 from stickslip.model.fe.elements import EXACT, CellGroup, NodeBlocks, Rules, cell_groups
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.links import Links
 from stickslip.model.fe.material import Materials
-from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms
+from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms, thermal_force
 from stickslip.model.fe.solid import integrate, node_dofs, support
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
@@ -80,6 +79,8 @@ class RotatingSolid:
         (3 nodes, n) CSR from the dofs to the x, y, z of all nodes, some of which follow others by equations; None if none does.
     small
         As in `Links`.
+    temperature
+        Temperatures of the nodes; None: no thermal strain.
     """
 
     structure: Structure
@@ -92,6 +93,7 @@ class RotatingSolid:
     centrifugal: FloatArray
     followers: Matrix | None = None
     small: str = ""
+    temperature: Temperature | None = None
     _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
     _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(default_factory=dict, init=False, repr=False)
 
@@ -109,7 +111,7 @@ class RotatingSolid:
     def _of_mass(self, block: FloatArray) -> Matrix:
         """Return the matrix with `block` (3, 3), times the nodal mass, for each pair of nodes."""
         whole = scipy.sparse.kron(self.nodal_mass, block, format="csr")
-        return self._of_dofs(with_inner_inertia(whole, self.mesh, self.material, self.quadrature, block))
+        return self._of_dofs(with_inner_inertia(whole, self.laws, self.quadrature, block))
 
     @cached_property
     def hourglass(self) -> Matrix | None:
@@ -117,9 +119,28 @@ class RotatingSolid:
         groups = [group for group in self.cell_groups if group.rule.hourglass is not None]
         if not groups:
             return None
-        laws = cell_laws(self.mesh, self.material)
-        parts = (hourglass_stiffness(group, laws_of_group(laws, group.mesh, group.rows)) for group in groups)
+        parts = (hourglass_stiffness(group, laws_of_group(self.laws, group.mesh, group.rows)) for group in groups)
         return self._of_dofs(sum(parts))
+
+    @cached_property
+    def laws(self) -> CellLaws:
+        """Materials of the cells at the temperature."""
+        return cell_laws(self.mesh, self.material, self.temperature)
+
+    @cached_property
+    def thermal_load(self) -> FloatArray | None:
+        """(n,) forces in N whose linear displacement is that of the thermal strain; None without thermal strain."""
+        if self.temperature is None or not any(self.laws.expansions):
+            return None
+        found = np.zeros_like(self.mesh.points)
+        for group in self.cell_groups:
+            found += thermal_force(laws_of_group(self.laws, group.mesh, group.rows), group.strain)
+        return np.asarray(self.onto.T @ found.ravel()) if found.any() else None
+
+    @property
+    def heated(self) -> bool:
+        """Whether thermal strain loads the solid, at rest, too."""
+        return self.thermal_load is not None
 
     @cached_property
     def onto(self) -> Matrix:
@@ -156,7 +177,7 @@ class RotatingSolid:
         return speed**2 * self.centrifugal
 
     def displacement(self, speed: float, *, tie: Matrix | None = None, nonlinear: bool = False) -> FloatArray:
-        """Return the static displacement under the centrifugal load.
+        """Return the static displacement under the centrifugal load and the thermal strain.
 
         Parameters
         ----------
@@ -182,10 +203,17 @@ class RotatingSolid:
         """
         self._check_speed(speed)
         linear = speed**2 * self._unit_displacement(tie)
+        if self.heated:
+            linear = linear + self._hot_displacement(tie)
         return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
 
     def polynomial(
-        self, tie: Matrix | None = None, *, tangent: Tangent = "consistent", unit: FloatArray | None = None
+        self,
+        tie: Matrix | None = None,
+        *,
+        tangent: Tangent = "consistent",
+        unit: FloatArray | None = None,
+        hot: FloatArray | None = None,
     ) -> SpeedPolynomial:
         """Return the stiffness as a polynomial of the speed, exact if the static displacement is linear.
 
@@ -193,7 +221,7 @@ class RotatingSolid:
         ----------
         tie
             As in `displacement`. Results are cached for the same tie.
-        tangent, unit
+        tangent, unit, hot
             As in `at_speed`; ``"nonlinear"`` has no polynomial.
         """
         if tangent not in TANGENTS[:2]:
@@ -203,10 +231,13 @@ class RotatingSolid:
                 "Use 'consistent' or 'textbook', or at_speed.",
             )
         self._refuse_small()
-        key = (_content(tie) if unit is None else sha256(unit.tobytes()).hexdigest(), tangent)
+        if hot is None and self.heated:
+            hot = self._hot_displacement(tie)
+        others = b"" if hot is None else hot.tobytes()
+        key = (_content(tie) if unit is None else sha256(unit.tobytes() + others).hexdigest(), tangent)
         if key not in self._polynomials:
             moved = self._unit_displacement(tie) if unit is None else unit
-            self._polynomials[key] = self._assemble_polynomial(moved, tangent)
+            self._polynomials[key] = self._assemble_polynomial(moved, hot, tangent)
         return self._polynomials[key]
 
     def at_speed(
@@ -217,8 +248,9 @@ class RotatingSolid:
         tangent: Tangent = "consistent",
         coriolis: bool = False,
         unit: FloatArray | None = None,
+        hot: FloatArray | None = None,
     ) -> Structure:
-        """Return the structure of small vibrations about the state of steady rotation.
+        """Return the structure of small vibrations about the state of steady rotation and temperature.
 
         Parameters
         ----------
@@ -234,19 +266,21 @@ class RotatingSolid:
             Whether ``2 Ω G`` is added to the damping.
         unit
             (n,) linear static displacement at 1 rad/s in m s², if other bodies affect it; None: computed from `tie`.
+        hot
+            (n,) linear static displacement by the thermal strain in m, likewise.
         """
         self._check_speed(speed)
         if tangent not in TANGENTS:
             raise input_error(
                 "RotatingSolid.at_speed", f"there is no tangent {tangent!r}", did_you_mean(tangent, list(TANGENTS))
             )
-        if self.small:  # no speed
+        if self.small and not self.heated:  # no speed
             return self.structure
         if tangent == "nonlinear":
-            start = speed**2 * self._unit_displacement(tie)
+            start = self.displacement(speed, tie=tie)
             stiffness = self._equilibrium(speed, tie, start)[1]
         else:
-            stiffness = self.polynomial(tie, tangent=tangent, unit=unit).at(speed)
+            stiffness = self.polynomial(tie, tangent=tangent, unit=unit, hot=hot).at(speed)
         damping = self.structure.damping
         if coriolis:
             damping = scipy.sparse.csr_array(damping + 2 * speed * self.coriolis)
@@ -261,16 +295,12 @@ class RotatingSolid:
     def _places(self) -> list[NodeBlocks]:
         return [NodeBlocks(group.mesh, self.free) for group in self.cell_groups]
 
-    def _materials(self, group: CellGroup) -> Materials:
-        if isinstance(self.material, Sequence):
-            return [self.material[row] for row in group.rows]
-        return self.material
-
-    def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
+    def _terms(self, displacement: FloatArray, *, green: bool = False, heated: bool = False) -> PrestressTerms:
         where = self.at_nodes(displacement)
         parts: list[Matrix] = []
         for group, places in zip(self.cell_groups, self._places, strict=True):
-            terms = prestress_terms(group.mesh, self._materials(group), group.strain, places, where, green=green)
+            laws = laws_of_group(self.laws, group.mesh, group.rows)
+            terms = prestress_terms(laws, group.strain, places, where, green=green, heated=heated)
             own = (terms.linear, terms.quadratic, terms.geometric)
             parts = [a + b for a, b in zip(parts, own, strict=True)] if parts else [*own]
         return PrestressTerms(*(self._of_dofs(part) for part in parts))
@@ -279,7 +309,7 @@ class RotatingSolid:
         where = self.at_nodes(displacement)
         found = np.zeros_like(where)
         for group in self.cell_groups:
-            found += internal_force(group.mesh, self._materials(group), group.strain, where)
+            found += internal_force(laws_of_group(self.laws, group.mesh, group.rows), group.strain, where)
         force: FloatArray = np.asarray(self.onto.T @ found.ravel())
         return force if self.hourglass is None else force + self.hourglass @ displacement
 
@@ -296,14 +326,23 @@ class RotatingSolid:
             self._displacements[key] = _solve(self.structure.stiffness, self.centrifugal, tie)
         return self._displacements[key]
 
+    def _hot_displacement(self, tie: Matrix | None) -> FloatArray:
+        """Return the linear static displacement (n,) by the thermal strain in m."""
+        key = f"hot {_content(tie)}"
+        if key not in self._displacements:
+            assert self.thermal_load is not None
+            self._displacements[key] = _solve(self.structure.stiffness, self.thermal_load, tie)
+        return self._displacements[key]
+
     def _equilibrium(self, speed: float, tie: Matrix | None, start: FloatArray) -> tuple[FloatArray, Matrix]:
         """Return displacement (n,) and tangent (n, n) of the equilibrium at finite displacement."""
         displacement, S = start, self.spin_softening
-        goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))
+        loads = [self.centrifugal_load(speed), *([] if self.thermal_load is None else [self.thermal_load])]
+        goal = BALANCED * sum(float(np.linalg.norm(_on_tie(load, tie))) for load in loads)
         for _ in range(NEWTON_STEPS):
             inner = self._inner_force(displacement)
             outer = speed**2 * (self.centrifugal + S @ displacement)
-            terms = self._terms(displacement, green=True)
+            terms = self._terms(displacement, green=True, heated=True)
             stiffness = self.structure.stiffness + terms.linear + terms.quadratic + terms.geometric
             stiffness = scipy.sparse.csr_array(stiffness - speed**2 * S)
             if np.linalg.norm(_on_tie(outer - inner, tie)) <= goal:
@@ -329,12 +368,22 @@ class RotatingSolid:
                 "Compute it at rest, or model that body by elements.",
             )
 
-    def _assemble_polynomial(self, unit: FloatArray, tangent: Tangent) -> SpeedPolynomial:
-        terms = self._terms(unit)
+    def _assemble_polynomial(self, unit: FloatArray, hot: FloatArray | None, tangent: Tangent) -> SpeedPolynomial:
+        terms, rest = self._terms(unit), self.structure.stiffness
         square = terms.geometric - self.spin_softening
-        if tangent == "textbook":
-            return SpeedPolynomial(self.structure.stiffness, square)
-        return SpeedPolynomial(self.structure.stiffness, square + terms.linear, terms.quadratic)
+        if tangent == "consistent":
+            square = square + terms.linear
+        if hot is not None:
+            own = self._terms(hot, heated=True)
+            rest = rest + own.geometric
+            if tangent == "consistent":
+                rest = rest + own.linear + own.quadratic
+                # twice the bilinear form of both displacements, brought to one size against rounding
+                scale = float(np.linalg.norm(hot) / (np.linalg.norm(unit) or 1.0)) or 1.0
+                both = self._terms(hot + scale * unit).quadratic - own.quadratic - scale**2 * terms.quadratic
+                square = square + both / scale
+            rest = scipy.sparse.csr_array(rest)
+        return SpeedPolynomial(rest, square, terms.quadratic if tangent == "consistent" else None)
 
 
 def rotating_solid(
@@ -346,6 +395,7 @@ def rotating_solid(
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
     links: Links | None = None,
+    temperature: Temperature | None = None,
 ) -> RotatingSolid:
     """Assemble a solid that rotates about an axis together with its supports.
 
@@ -355,6 +405,8 @@ def rotating_solid(
         As in `assemble_solid`.
     axis
         Axis of rotation.
+    temperature
+        Temperatures of the nodes: materials are taken there, and thermal strain belongs to the static state.
 
     Returns
     -------
@@ -367,28 +419,27 @@ def rotating_solid(
     InputError
         As in `assemble_solid`.
     """
-    mass, stiffness = integrate(mesh, material, quadrature, links)
+    mass, stiffness = integrate(mesh, material, quadrature, links, temperature)
     structure, moving, onto = support(mesh, mass, stiffness, clamped, held, links)
     # positions are interpolated like displacements, so the mass matrix integrates the load exactly
     load = mass @ axis.arm(mesh.points).ravel()
-    own = with_inner_inertia(mass, mesh, material, quadrature, -np.eye(3))
+    own = with_inner_inertia(mass, cell_laws(mesh, material, temperature), quadrature, -np.eye(3))
     nodal_mass = scipy.sparse.csr_array(own[::3][:, ::3])
     load = load[moving] if onto is None else np.asarray(onto.T @ load)
     small = "" if links is None else links.small
-    return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load, onto, small)
+    return RotatingSolid(
+        structure, mesh, material, axis, quadrature, moving, nodal_mass, load, onto, small, temperature
+    )
 
 
-def with_inner_inertia(
-    matrix: Matrix, mesh: SolidMesh, material: Materials, quadrature: Rules, block: FloatArray
-) -> Matrix:
+def with_inner_inertia(matrix: Matrix, laws: CellLaws, quadrature: Rules, block: FloatArray) -> Matrix:
     """Add the inertia of bricks with incompatible modes, with `block` (3, 3), to a matrix (3n, 3n) of all nodes.
 
     Their mass couples the directions, so it is no nodal mass times a block.
     """
-    groups = [group for group in cell_groups(mesh, quadrature) if group.rule.inner]
+    groups = [group for group in cell_groups(laws.mesh, quadrature) if group.rule.inner]
     if not groups:
         return matrix
-    laws = cell_laws(mesh, material)
     return matrix + sum(inertia(group, laws_of_group(laws, group.mesh, group.rows), block) for group in groups)
 
 

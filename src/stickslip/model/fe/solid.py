@@ -11,7 +11,7 @@ import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known
-from stickslip.model.fe.cell_laws import cell_laws
+from stickslip.model.fe.cell_laws import CellLaws, Temperature, cell_laws
 from stickslip.model.fe.cell_matrices import assemble_cells, is_plain
 from stickslip.model.fe.elements import (
     EXACT,
@@ -24,7 +24,7 @@ from stickslip.model.fe.elements import (
     library_element,
 )
 from stickslip.model.fe.links import Links, eliminate
-from stickslip.model.fe.material import AnyMaterial, Material, Materials
+from stickslip.model.fe.material import Material, Materials
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, SolidMesh, by_kind
 from stickslip.model.structure import Structure, nodal_dofs
 
@@ -39,6 +39,7 @@ def assemble_solid(
     held: BoolArray | None = None,
     quadrature: Rules = EXACT,
     links: Links | None = None,
+    temperature: Temperature | None = None,
 ) -> Structure:
     """Assemble mass and stiffness, with the nodes of the sets `clamped` removed.
 
@@ -56,6 +57,8 @@ def assemble_solid(
         Quadrature, or a list of m, one for each cell; the default integrates straight-edged cells exactly.
     links
         Equations between nodes, point masses, springs and dashpots; None: none.
+    temperature
+        Temperatures of the nodes, at which materials are taken; None: no material depends on it. Stress is not considered here.
 
     Returns
     -------
@@ -69,7 +72,7 @@ def assemble_solid(
         If the mesh has nodes without elements or cells inside out, neighbours that do not share their mid-side nodes,
         `clamped` names an unknown set, or another set has clamped nodes.
     """
-    mass, stiffness = integrate(mesh, material, quadrature, links)
+    mass, stiffness = integrate(mesh, material, quadrature, links, temperature)
     return support(mesh, mass, stiffness, clamped, held, links)[0]
 
 
@@ -152,30 +155,36 @@ def node_dofs(nodes: IntArray) -> IntArray:
 
 
 def integrate(
-    mesh: SolidMesh, material: Materials, quadrature: Rules, links: Links | None = None
+    mesh: SolidMesh,
+    material: Materials,
+    quadrature: Rules,
+    links: Links | None = None,
+    temperature: Temperature | None = None,
 ) -> tuple[Matrix, Matrix]:
     """Return mass and stiffness of the free body with its links, dofs node-major in the mesh's own order."""
     check_nodes(mesh, () if links is None else links.nodes)
-    mass, stiffness = _integrate_cells(mesh, material, quadrature)
+    mass, stiffness = _integrate_cells(mesh, material, quadrature, temperature)
     if links is None:
         return mass, stiffness
     points = scipy.sparse.diags_array(np.repeat(links.mass, 3))
     return scipy.sparse.csr_array(mass + points), scipy.sparse.csr_array(stiffness + links.springs)
 
 
-def _integrate_cells(mesh: SolidMesh, material: Materials, quadrature: Rules) -> tuple[Matrix, Matrix]:
+def _integrate_cells(
+    mesh: SolidMesh, material: Materials, quadrature: Rules, temperature: Temperature | None
+) -> tuple[Matrix, Matrix]:
     groups = cell_groups(mesh, quadrature)
     for group in groups:
         for degree in {group.rule.stiffness: group.strain, group.rule.mass: group.inertia}.values():
             check_jacobians(group.mesh, degree)
     check_shared(mesh)
     everywhere = len(np.unique(mesh.cells[mesh.cells >= 0])) == len(mesh.points)
-    laws = cell_laws(mesh, material)
+    laws = cell_laws(mesh, material, temperature)
     if len(laws.each) == 1 and len(groups) == 1 and everywhere:
-        return _integrate(groups[0], laws.each[0])
+        return _integrate(groups[0], laws)
     n = 3 * len(mesh.points)
     mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
-    for index, one in enumerate(laws.each):
+    for index in range(len(laws.each)):
         for group in groups:
             cells = group.mesh.cells[laws.which[group.rows] == index]
             if not len(cells):
@@ -184,20 +193,21 @@ def _integrate_cells(mesh: SolidMesh, material: Materials, quadrature: Rules) ->
             part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
             rows = node_dofs(nodes)
             place = scipy.sparse.csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows)))
-            M, K = _integrate(cell_groups(part, group.rule)[0], one)
+            own = cell_groups(part, group.rule)[0]
+            M, K = _integrate(own, laws.only(index, own.mesh, nodes))
             mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
     return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
 
 
-def _integrate(group: CellGroup, material: AnyMaterial) -> tuple[Matrix, Matrix]:
+def _integrate(group: CellGroup, laws: CellLaws) -> tuple[Matrix, Matrix]:
     """Integrate a body of one material.
 
     Both matrices are built from scalar integrals, ``∫ φ_p φ_q`` and ``D_ab = ∫ ∂_a φ_p ∂_b φ_q``:
     ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. This costs a fraction of the vector-valued form.
     """
-    mesh, quadrature = group.mesh, group.rule
+    mesh, quadrature, material = group.mesh, group.rule, laws.each[0]
     if not (is_plain(group) and isinstance(material, Material)):
-        return assemble_cells(group, cell_laws(mesh, material))
+        return assemble_cells(group, laws)
     bases, theirs = _bases(mesh, quadrature)
 
     def assemble(integrand: Callable[..., FloatArray], degree: int) -> Matrix:
