@@ -605,3 +605,33 @@ def test_what_an_archive_says_and_a_study_has_to_say_is_told(tmp_path):
         ansys_passed_over(path)
     path.write_text(cube())
     assert ansys_passed_over(path) == ()
+
+
+def in_format(text: str, given: str, widths: tuple[int, ...], real: int, digits: int) -> str:
+    """Return an archive with its block of nodes in another format."""
+    head, _, body = text.partition("(3i9,6e21.13e3)\n")
+    rows, end = [], body.index("N,R5.3")
+    for line in body[:end].splitlines():
+        whole = [line[9 * i : 9 * i + 9] for i in range(3)]
+        numbers = [line[27 + 21 * i : 48 + 21 * i] for i in range(3)]
+        row = "".join(f"{int(n):{w}d}" for n, w in zip(whole, widths, strict=False))
+        rows.append(row + "".join(f"{float(x or 0):{real}.{digits}E}" for x in numbers))
+    return f"{head}{given}\n" + "\n".join(rows) + "\n" + body[end:]
+
+
+@pytest.mark.parametrize(
+    ("given", "widths", "real", "digits"),
+    [
+        ("(3i7,6e22.13)", (7, 7, 7), 22, 13),
+        ("(1i7,2i9,6e21.13)", (7, 9, 9), 21, 13),
+        ("(1i9,2i9,6e21.13)", (9, 9, 9), 21, 13),
+        ("(2i9,6e21.13)", (9, 9), 21, 13),
+        ("(1i9,3e20.9e3)", (9,), 20, 9),
+        ("(3i8,6e16.9)", (8, 8, 8), 16, 9),
+    ],
+)
+def test_nodes_in_the_formats_of_other_versions(tmp_path, given, widths, real, digits):
+    whole, other = tmp_path / "whole.cdb", tmp_path / "other.cdb"
+    whole.write_text(cube())
+    other.write_text(in_format(cube(), given, widths, real, digits))
+    np.testing.assert_array_equal(read_ansys_archive(other).points, read_ansys_archive(whole).points)

@@ -157,6 +157,23 @@ def _format(path: Path, lines: list[str], at: int) -> tuple[int, int, int]:
     return int(found[1]), int(found[2]), int(found[3] or 0)
 
 
+def _node_format(path: Path, lines: list[str], at: int) -> tuple[int, int, int]:
+    """Return the widths of the node number, of all whole numbers together, and of a real one, from ``(1i7,2i9,6e21.13)``.
+
+    The groups of whole numbers differ from version to version; the node number is the first.
+    """
+    text = lines[at] if at < len(lines) else ""
+    found = re.fullmatch(r"\(((?:\d{1,3}i\d{1,3},)+)\d{0,3}e(\d{1,3})\.\d+(?:e\d)?\)", text.strip().lower())
+    groups = [] if found is None else [tuple(map(int, g.split("i"))) for g in found[1].split(",") if g]
+    if found is None or not all(count and width for count, width in groups) or not int(found[2]):
+        raise input_error(
+            f"{path}: line {at + 1}",
+            f"{text[:40]!r} is no format of nodes such as (3i9,6e21.13e3)",
+            "Write the archive with CDWRITE,DB,model,cdb; if ANSYS wrote this line, send it to us.",
+        )
+    return groups[0][1], sum(count * width for count, width in groups), int(found[2])
+
+
 def _block_end(lines: list[str], at: int) -> int:
     """Return the first line from `at` on that starts like a command or ends a block: ``N,R5.3,LOC,-1`` or ``-1``."""
     while at < len(lines) and lines[at][:1] in " 0123456789" and lines[at].strip() not in {"", "-1"}:
@@ -181,13 +198,12 @@ def _fields(path: Path, lines: list[str], first: int, width: int, kind: Callable
 def _node_block(path: Path, lines: list[str], at: int) -> tuple[FloatArray, int]:
     """Return (n, 7) numbers, positions and angles, and the line after them."""
     stated = [word.strip() for word in lines[at].split(",")]
-    whole, width, real = _format(path, lines, at + 1)
+    width, split, real = _node_format(path, lines, at + 1)
     first, end = at + 2, _block_end(lines, at + 2)
     body = lines[first:end]
-    split = whole * width
     numbers = _fields(path, [line[:width] for line in body], first, width, integer)
-    rest = _fields(path, [line[split:] for line in body], first, max(real, 1), float)
-    if any(len(row) != 1 for row in numbers) or any(len(row) > 6 for row in rest) or not real:
+    rest = _fields(path, [line[split:] for line in body], first, real, float)
+    if any(len(row) != 1 for row in numbers) or any(len(row) > 6 for row in rest):
         raise input_error(f"{path}: line {at + 1}", "the nodes do not follow their format", CUT_SHORT)
     expected = stated[4] if len(stated) > 4 else ""
     if is_whole(expected) and int(expected) != len(body):
