@@ -108,6 +108,21 @@ def test_general_matrices_go_to_superlu(kind, monkeypatch):
         factorise(matrix, backend="feral")
 
 
+@pytest.mark.parametrize("shift", [0.3, -0.3])
+def test_large_complex_matrices_are_factorised_front_by_front(monkeypatch, shift):
+    """Definite ones; the others go on to feral, if installed, or to SuperLU."""
+    monkeypatch.setattr(factorisation, "HUGE", 100)
+    monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
+    monkeypatch.setattr(factorisation, "DENSE", 50)
+    matrix = hermitian((13, 12), shift)
+    found = factorise(matrix)
+    lost = "feral" if find_spec("feral") else "superlu"
+    assert found.backend == ("multifrontal" if shift > 0 else lost)
+    check(found, matrix)
+    negative = int(np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0))
+    assert negative_eigenvalues(matrix) == found.negative == negative
+
+
 @needs_feral
 def test_large_hermitian_matrices_go_to_the_package(monkeypatch):
     monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 500)
@@ -226,6 +241,7 @@ def young(monkeypatch):
 
     def put(**faults):
         monkeypatch.setattr(factorisation, "MIN_FERAL_ROWS", 100)
+        monkeypatch.setattr(factorisation, "HUGE", 100)
         monkeypatch.setattr(factorisation, "DENSE", 50)
         monkeypatch.setattr(factorisation, "find_spec", lambda _: SimpleNamespace(origin="there"))
         monkeypatch.setitem(sys.modules, "feral", Young(**faults))

@@ -353,6 +353,35 @@ def test_a_tie_in_the_mean_moves_along_with_linear_fields(grid_a, grid_b, kind):
     np.testing.assert_allclose(weights @ fields[1], fields[0], atol=1e-11)
 
 
+@given(st.tuples(grids, grids), st.tuples(grids, grids), st.tuples(kinds, kinds))
+def test_a_tie_in_the_mean_passes_a_constant_stress(grid_a, grid_b, kind):
+    """The consistent loads of side A go over into those of side B."""
+    a, b = two_planes(grid_a, grid_b, kind)
+    loads = [consistent_areas(side) for side in (a, b)]
+    np.testing.assert_allclose(mortar_tie(a, b).T @ loads[0], loads[1], atol=1e-11 * loads[0].sum())
+
+
+def consistent_areas(side):
+    """Return ``∫ N dA`` of each node, by the weights of plane triangles and rectangles."""
+    shares = {3: [1 / 3] * 3, 4: [1 / 4] * 4, 6: [0.0] * 3 + [1 / 3] * 3, 8: [-1 / 12] * 4 + [1 / 3] * 4}
+    out = np.zeros(len(side.points))
+    for row in side.facets:
+        nodes = row[row >= 0]
+        corners = side.points[nodes[: 3 if nodes.size in (3, 6) else 4]]
+        area = np.linalg.norm(np.cross(corners[1] - corners[0], corners[-1] - corners[0]))
+        np.add.at(out, nodes, area * np.array(shares[nodes.size]) / (2 if nodes.size in (3, 6) else 1))
+    return out
+
+
+@pytest.mark.parametrize("kind", ["quad", "tri6", "quad8"])
+def test_a_node_tied_in_the_mean_follows_nodes_nearby(kind):
+    steps = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 12)
+    a, b = two_planes((steps[0], steps[0]), (steps[1], steps[1]), (kind, kind))
+    weights = mortar_tie(a, b).tocoo()
+    apart = np.linalg.norm(a.points[weights.row, :2] - b.points[weights.col, :2], axis=1)
+    assert apart.max() < 5 / 12
+
+
 def test_a_side_that_reaches_beyond_the_other_is_refused():
     a, b = two_planes((COARSE[0], COARSE[1]), ([0.0, 0.5, 0.8], COARSE[1]))
     with pytest.raises(InputError, match="20 % of side A have nothing of side B opposite"):

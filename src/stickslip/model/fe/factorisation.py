@@ -76,7 +76,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         ``dense``; ``multifrontal`` (real symmetric and complex Hermitian, positive definite); ``superlu`` (SciPy's); ``feral``
         (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest applicable one that is
         installed. If feral fails, finds a vanishing pivot, or solves with too large a residual, ``auto`` takes SuperLU, with a
-        warning.
+        warning. Complex matrices that are not positive definite go from ``multifrontal`` to feral, or to SuperLU.
     say
         Called with a sentence before a long factorisation.
 
@@ -94,21 +94,27 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         found = _dense(matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix))
     else:
         say(f"factorising {matrix.shape[0]} equations ({chosen})")
-        try:
-            found = SPARSE[chosen](scipy.sparse.csc_array(matrix))
-        except _DistrustedError as error:
-            if backend != "auto":
-                raise StickslipError(f"factorise: {error}") from error
-            _warn(error)
-            found = _superlu(scipy.sparse.csc_array(matrix))
-        except SingularError:
-            if chosen not in ("multifrontal", "feral") or backend != "auto":
-                raise
-            not_so = "positive definite" if chosen == "multifrontal" else "regular for feral"
-            say(f"the matrix is not {not_so}: factorising again (superlu)")
-            found = _superlu(scipy.sparse.csc_array(matrix))
+        found = _sparse(matrix, chosen, say, free=backend == "auto")
     refuse_singular(matrix, found)
     return found
+
+
+def _sparse(matrix: Matrix, backend: str, say: Say, *, free: bool) -> Factorisation:
+    """Factorise a sparse matrix; another backend takes over where one fails, if the choice is `free`."""
+    try:
+        return SPARSE[backend](matrix)
+    except _DistrustedError as error:
+        if not free:
+            raise StickslipError(f"factorise: {error}") from error
+        _warn(error)
+        return _superlu(matrix)
+    except SingularError:
+        if backend not in ("multifrontal", "feral") or not free:
+            raise
+        following = _indefinite() if backend == "multifrontal" else "superlu"
+        not_so = "positive definite" if backend == "multifrontal" else "regular for feral"
+        say(f"the matrix is not {not_so}: factorising again ({following})")
+        return _sparse(matrix, following, say, free=True)
 
 
 def _chosen(matrix: Matrix, backend: str) -> str:
@@ -127,10 +133,15 @@ def _chosen(matrix: Matrix, backend: str) -> str:
         return "dense"
     if matrix.shape[0] <= MIN_FERAL_ROWS or not _hermitian(matrix):
         return "superlu"
-    if _has_feral():
+    if _has_feral() and not np.iscomplexobj(matrix):
         return "feral"
     positive = matrix.shape[0] > HUGE and np.all(matrix.diagonal().real > 0)
     return "multifrontal" if positive else "superlu"
+
+
+def _indefinite() -> str:
+    """Return the backend for a large Hermitian matrix that is not positive definite."""
+    return "feral" if _has_feral() else "superlu"
 
 
 def _has_feral() -> bool:
@@ -172,7 +183,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
     """
     chosen = _chosen(matrix, "auto")
     if chosen == "multifrontal":
-        chosen = "superlu"
+        chosen = _indefinite()
     if chosen == "dense":
         whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
         whole = (whole + whole.conj().T) / 2  # makes the diagonal exactly real
@@ -181,7 +192,6 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
         signs = scipy.linalg.eigvalsh_tridiagonal(np.diag(blocks).real, beside)
         return int(np.count_nonzero(signs < 0))
     say(f"factorising {matrix.shape[0]} equations ({chosen}) to count frequencies")
-    matrix = scipy.sparse.csc_array(matrix)
     return _by_feral(matrix, say) if chosen == "feral" else _by_superlu(matrix)
 
 
@@ -216,7 +226,12 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
     from scipy.sparse.linalg import splu
 
     try:
-        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=threshold, options={"SymmetricMode": True})
+        lu = splu(
+            scipy.sparse.csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=threshold,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError as error:
         raise SingularError(f"factorise: {error}") from error
 
@@ -234,7 +249,7 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
 
 def _multifrontal(matrix: Matrix) -> Factorisation:
     """Factorise a Hermitian positive definite matrix with the multifrontal method."""
-    return Factorisation(multifrontal(matrix.tocsr()).solve, "multifrontal", lambda: 0)
+    return Factorisation(multifrontal(scipy.sparse.csr_array(matrix)).solve, "multifrontal", lambda: 0)
 
 
 def _feral(matrix: Matrix) -> Factorisation:
