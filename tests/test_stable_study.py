@@ -263,6 +263,21 @@ def test_between_folds_the_sign_of_the_determinant_tells_what_multipliers_do() -
     assert {i: e.verdict for i, e in found.items()} == {i: e.verdict for i, e in every.items()}
 
 
+def test_a_point_with_fewer_harmonics_is_examined_where_neighbours_have_another_sign() -> None:
+    """Its fold lies elsewhere: the sign of its determinant says nothing about motions with more harmonics."""
+    asked = lifted(low=7, high=7)
+    response = response_of(asked)
+    signed = [i for i, e in looked_at(asked, response).items() if e.basis == "by sign"]
+    middle = signed[len(signed) // 2]
+    own = response.accepted[middle]
+    few = replace(own.point, coefficients=own.point.coefficients[:6], harmonics=own.point.harmonics[:6])
+    others = [replace(a, point=few) if a is own else a for a in response.accepted]
+    assert few.order == 5
+    found = looked_at(asked, replace(response, accepted=tuple(others)))
+    assert found[middle].basis == "examined"
+    assert "by sign" in {found[i].basis for i in signed if i != middle}
+
+
 def test_the_peak_is_the_largest_motion_that_is_not_unstable() -> None:
     response = response_of(rubbed())
     assert response.top is not None

@@ -11,7 +11,12 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from evidence.trust.trial import SURE, Outcome, outcome
+from evidence.trust.trial import SURE, Judged, Outcome, outcome
+
+
+def _decays(judged: Judged) -> bool:
+    """Whether the judge finds a point stable, beyond its own error."""
+    return judged.multiplier < 1 - max(SURE * judged.multiplier_error, 1e-6)
 
 
 def show(outcomes: Iterable[Outcome], seed: int) -> None:
@@ -37,9 +42,7 @@ def show(outcomes: Iterable[Outcome], seed: int) -> None:
     )
     print(f"called stable and unstable: {sum(j.unstable for _, j in stable)} of {len(stable)}")
     called = [j for _, j in judged if j.stability == "unstable"]
-    print(
-        f"called unstable and stable: {sum(j.multiplier < 1 - max(SURE * j.multiplier_error, 1e-6) for j in called)} of {len(called)}"
-    )
+    print(f"called unstable and stable: {sum(_decays(j) for j in called)} of {len(called)}")
     print(
         f"trusted and not examined: {sum(o.not_examined for o in every)} of {levels[0]}; peaks: {sum(o.peak_level == 0 and o.peak_stability == 'not examined' for o in every)}"
     )
@@ -52,8 +55,10 @@ def show(outcomes: Iterable[Outcome], seed: int) -> None:
     for text, count in Counter(j.reason for j in false_doubts).most_common(8):
         print(f"   {count:4d} false doubts: {text}")
     for o, j in judged:
-        if (j.level == 0 and (j.wrong or (j.unstable and j.stability != "unstable"))) or (
-            j.unstable and j.stability in ("stable", "carried")
+        if (
+            (j.level == 0 and (j.wrong or (j.unstable and j.stability != "unstable")))
+            or (j.unstable and j.stability in ("stable", "carried"))
+            or (j.stability == "unstable" and _decays(j))
         ):
             print(
                 f"   machine {o.number} ({o.family}) {j.hz:.4f} Hz: level {j.level}, {j.stability}, off {j.off:.1%} (judge {j.motion_error:.0e}), multiplier {j.multiplier:.5f} ± {j.multiplier_error:.0e}"

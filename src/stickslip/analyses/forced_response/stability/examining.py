@@ -187,14 +187,21 @@ class _Search:
         )
 
     def _opposed(self, place: int) -> bool:
-        """Whether the determinant differs in sign from the nearest stable point of the branch, and examined neighbours with this sign are unstable."""
+        """Whether the determinant differs in sign from the nearest stable point of the branch, and examined neighbours with this sign are unstable.
+
+        Neighbours with more harmonics do not count: the fold of a point with fewer lies elsewhere.
+        """
         sign, stretch = self.course.sign, self._stretches
         others = [k for k in self._of_run(place) if k != place]
-        same = {self.found[k].verdict for k in others if stretch[k] == stretch[place]}
+        alike = (k for k in others if stretch[k] == stretch[place] and self._order(k) <= self._order(place))
         stable = [k for k in others if self.found[k].verdict == "stable"]
-        if same != {"unstable"} or not stable:
+        if {self.found[k].verdict for k in alike} != {"unstable"} or not stable:
             return False
         return bool(sign[min(stable, key=lambda k: abs(k - place))] * sign[place] < 0.0)
+
+    def _order(self, place: int) -> int:
+        """Return the highest harmonic of a point as solved."""
+        return self.response.accepted[self.course.order[place]].point.order
 
     def _of_run(self, place: int) -> list[int]:
         run = self._runs[place]
