@@ -21,7 +21,7 @@ PAGES_OF_KEYS = {
     "general": ("At the top, material, damping, reduction", ("", "material", "damping", "reduction")),
     "parts": ("Parts", ("part",)),
     "contacts": ("Contacts and joins", ("contact", "join")),
-    "loads": ("Loads and rotation", ("load", "rotation")),
+    "loads": ("Loads, rotation, operating range", ("load", "rotation", "operation")),
     "aero": ("Aerodynamic coefficients", ("aero",)),
     "mistuning": ("Mistuning", ("mistuning",)),
     "output": ("Output and measured peaks", ("output", "measured")),

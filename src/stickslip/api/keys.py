@@ -76,8 +76,17 @@ class LimitsKeys(TypedDict, total=False):
     """memory in GB at which the process of a job is ended, and at the second time the job set aside, greater than zero; left out: none"""
 
 
-class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
-    """Keys of [forced_response], [harmonics], [solver] and [limits]."""
+class OperationKeys(TypedDict, total=False):
+    """Keys of [operation]."""
+
+    operating_hz: Sequence[float] | FloatArray | None
+    """operating range [lowest, highest] of the excitation in Hz, for [forced_response]"""
+    operating_rpm: Sequence[float] | FloatArray | None
+    """operating speeds [lowest, highest] in rpm, for [campbell], and for [forced_response] with an engine order"""
+
+
+class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, total=False):
+    """Keys of [forced_response], [harmonics], [solver], [limits] and [operation]."""
 
     frequency_hz: Sequence[float] | FloatArray | None
     """the range [lowest, highest] in Hz, the lower frequency first"""
@@ -301,8 +310,8 @@ class ModesKeys(TypedDict, total=False):
     """keep only the rows of the reference whose column 'case' has this value"""
 
 
-class CampbellKeys(TypedDict, total=False):
-    """Keys of [campbell]."""
+class CampbellKeys(OperationKeys, total=False):
+    """Keys of [campbell] and [operation]."""
 
     contacts: Literal["static", "stuck", "open"]
     """what contacts do: static (those pressed by the static loads stick, the others are open), stuck or open; default 'static'"""

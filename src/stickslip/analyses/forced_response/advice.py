@@ -20,6 +20,7 @@ from stickslip.analyses.forced_response.problem import STILL_HZ, Question, quest
 from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
 from stickslip.analyses.forced_response.stability.stable import cost_lines
+from stickslip.analyses.operation import Operating, asked_of, of_frequencies
 from stickslip.analyses.waves.records import label
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.build import holding_points
@@ -67,6 +68,7 @@ def advice(case: Case, model: Model) -> Advice:
         at_rest=(*contacts_at_rest(question), *damper_lines(statics)),
         beside=(
             *beside_the_range(question),
+            *_in_operation(question, *of_frequencies(asked_of(case), model.engine_order)),
             *([] if physics is None else driven_line(physics)),
             *_of_friction(physics),
             *_notes(question),
@@ -126,6 +128,24 @@ def beside_the_range(question: Question) -> list[str]:
         ]
         pieces += _listed(elastic[elastic > highest][:1], "above")
         told += [f"natural frequencies{state}: {', '.join(pieces)}"] * bool(hertz.size)
+    return told
+
+
+def _in_operation(question: Question, lowest: float, highest: float) -> list[str]:
+    """Return the natural frequencies inside the operating range, or the nearest one with its margin."""
+    range_ = Operating(lowest, highest, "Hz")
+    if not range_.known:
+        return []
+    times, told = question.driven[0], []
+    both = zip((", contacts open", ", contacts stuck"), question.natural_states, strict=True)
+    for state, hertz in both if question.model.contacts.names else (("", question.natural_states[0]),):
+        excited = hertz[hertz > STILL_HZ] / times
+        inside = [f"{f:.2f}" for f in excited if range_.margin(f) == 0.0][:LISTED]
+        if inside:
+            told.append(f"operating range {range_}{state}: {' and '.join(inside)} Hz inside")
+        elif excited.size:
+            near = min(excited, key=lambda f: abs(range_.margin(f)))
+            told.append(f"operating range {range_}{state}: nearest {near:.2f} Hz, {range_.where(near)}")
     return told
 
 

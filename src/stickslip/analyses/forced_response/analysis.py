@@ -1,5 +1,6 @@
 """The steady vibration under harmonic loads: branches, peaks, and the accuracy of the harmonics."""
 
+import json
 from collections.abc import Iterator, Sequence
 from time import perf_counter
 
@@ -21,7 +22,7 @@ from stickslip.analyses.forced_response.problem import (
     with_comparisons,
 )
 from stickslip.analyses.forced_response.records.blades import of_blades
-from stickslip.analyses.forced_response.records.columns import KINDS, KnownVerdicts, stored
+from stickslip.analyses.forced_response.records.columns import KINDS, KnownVerdicts, OperatingRange, stored
 from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
 from stickslip.analyses.forced_response.records.points import Response, lost_point
 from stickslip.analyses.forced_response.records.values import (
@@ -53,6 +54,7 @@ from stickslip.analyses.forced_response.summary import tables
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.cases import verdicts
 from stickslip.analyses.forced_response.verdicts.working_range import with_regimes
+from stickslip.analyses.operation import asked_of, of_frequencies, of_speeds
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.errors import SingularError
@@ -94,6 +96,7 @@ def _inputs(case: Case, model: Model) -> Question:
     """Return the question of a case; refuse cases that cannot be computed."""
     for line in of_pressures(case, model):
         LOG.info(line)
+    of_frequencies(asked_of(case), model.engine_order)  # refused before any computation
     return with_comparisons(question_of(case, model), case, model)
 
 
@@ -133,9 +136,27 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
 
 def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the responses of all cases."""
-    cases = [_values(s) for s in solved]
+    cases = [_values(s) | _operating(s) for s in solved]
     labels = [s.case.label for s in solved]
     return put_together(cases, labels)
+
+
+def _operating(solved: Solved) -> Values:
+    """Return the operating range of a case; nothing if the study has none."""
+    asked = asked_of(solved.case)
+    speeds = of_speeds(asked)
+    order = json.loads(str(solved.notes.get("model", {}).get("attributes", "{}"))).get("engine_order")
+    low, high = of_frequencies(asked, order)
+    if not np.isfinite(low):
+        return {}
+    return stored(
+        OperatingRange(
+            operating_lowest_hz=low,
+            operating_highest_hz=high,
+            operating_lowest_rpm=speeds.lowest,
+            operating_highest_rpm=speeds.highest,
+        )
+    )
 
 
 def _verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
@@ -332,7 +353,7 @@ FORCED_RESPONSE = Analysis(
     dataset=_dataset,
     check=advice,
     summary=tables,
-    shared=("harmonics", "solver", "limits"),
+    shared=("harmonics", "solver", "limits", "operation"),
     answers=KINDS,
     checks=(IN_TIME, HARMONICS),
     verdicts=_verdicts,

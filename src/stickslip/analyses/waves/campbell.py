@@ -1,16 +1,24 @@
 """Natural frequencies against rotor speed, and their crossings with engine orders."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.analyses.facts import NOTE
+from stickslip.analyses.operation import asked_of, of_speeds
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
 from stickslip.analyses.waves.records import Campbell, Unfollowed, WaveBranches, Wheel
 from stickslip.analyses.waves.solve import Question, follow_wave, in_still_fluid
 from stickslip.analyses.waves.tables import CampbellTable
-from stickslip.analyses.waves.verdicts import basis_doubts, campbell_doubts, campbell_tables, unfollowed_from
+from stickslip.analyses.waves.verdicts import (
+    basis_doubts,
+    campbell_doubts,
+    campbell_tables,
+    in_operation,
+    unfollowed_from,
+)
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.study.analysis import Case, Solved
@@ -30,6 +38,7 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Ve
     waves: tuple[WaveBranches, ...] = tuple(solved.records)
     wheel = Wheel(int(facts["sectors"]), bool(solved.notes[NOTE]["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
+    operating = of_speeds(asked_of(solved.case))
     unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel))
     found = Campbell(
         **facts,
@@ -37,8 +46,10 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Ve
         waves=waves,
         engine_orders=np.array(asked.engine_orders),
         unfollowed=tuple(Unfollowed(engine_order=m, from_rpm=rpm) for m, rpm in beyond),
+        operating_lowest_rpm=operating.lowest,
+        operating_highest_rpm=operating.highest,
     )
-    return found, [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
+    return found, [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves), *in_operation(found)]
 
 
 def _unfollowed(waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable) -> list[tuple[int, float]]:
@@ -77,12 +88,15 @@ def _inputs(case: Case, model: Model) -> Question:
     )
 
 
-CAMPBELL = wave_analysis(
-    "campbell",
-    CampbellTable,
-    WaveBranches,
-    _inputs,
-    solved_by(follow_wave),
-    _answer,
-    (Campbell, campbell_tables),
+CAMPBELL = replace(
+    wave_analysis(
+        "campbell",
+        CampbellTable,
+        WaveBranches,
+        _inputs,
+        solved_by(follow_wave),
+        _answer,
+        (Campbell, campbell_tables),
+    ),
+    shared=("operation",),
 )

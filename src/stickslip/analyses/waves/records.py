@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stickslip.analyses.facts import ModelFacts
+from stickslip.analyses.operation import Operating
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.column import column, rows
 from stickslip.errors import input_error
@@ -122,6 +123,13 @@ class Campbell(ModelFacts):
     waves: tuple[WaveBranches, ...] = rows("wave")
     engine_orders: IntArray = column("1", "engine order whose crossings are looked for", along="order")
     unfollowed: tuple[Unfollowed, ...] = rows("unfollowed", "unfollowed_", always=True)
+    operating_lowest_rpm: float = column("rpm", "lowest operating speed, NaN without one", default=np.nan)
+    operating_highest_rpm: float = column("rpm", "highest operating speed", default=np.nan)
+
+    @property
+    def operating(self) -> Operating:
+        """Operating speeds."""
+        return Operating(self.operating_lowest_rpm, self.operating_highest_rpm, "rpm")
 
     @property
     def crossings(self) -> list[tuple[int, Crossing]]:

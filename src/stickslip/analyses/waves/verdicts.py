@@ -1,13 +1,14 @@
 """Verdicts on the analyses by waves, and their terminal tables."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import record_of, told_apart
+from stickslip.analyses.operation import MARGIN
 from stickslip.analyses.waves.records import (
     Campbell,
     Flutter,
@@ -128,6 +129,29 @@ def campbell_doubts(
         remedy = "Add their nodal diameters to campbell.nodal_diameters, or leave this key out."
         said.append((why, remedy, f"EO {in_ranges(unseen)}"))
     return tuple(Verdict("doubtful", why=why, remedy=remedy, not_judged=short) for why, remedy, short in said)
+
+
+def in_operation(found: Campbell) -> Iterator[Verdict]:
+    """Note the crossings within the operating speeds, else the margin of the nearest one; doubt speeds outside the diagram."""
+    own, rpm = found.operating, found.speeds_rpm
+    if not own.known:
+        return
+    if own.lowest < rpm.min() or own.highest > rpm.max():
+        why = f"the operating speeds, {own}, reach beyond the diagram, {rpm.min():.5g} to {rpm.max():.5g} rpm"
+        yield Verdict("doubtful", why=why, remedy="Widen campbell.speeds_rpm.")
+    names = labels(found)
+    met = sorted(found.crossings, key=lambda one: abs(own.margin(one[1].speed_rpm)))
+    told = [f"EO {c.engine_order} with {names[w]}, mode {c.mode + 1} at {c.speed_rpm:.5g} rpm" for w, c in met]
+    inside = [text for text, (_, c) in zip(told, met, strict=True) if not own.margin(c.speed_rpm)]
+    if inside:
+        why = f"{counted(len(inside), 'crossing')} inside the operating speeds, {own}: {', '.join(inside)}"
+        yield Verdict(
+            "trusted", why=why, remedy="The machine runs at these resonances: judge their amplitudes, or shift them."
+        )
+    elif met:
+        where = own.where(met[0][1].speed_rpm)
+        why = f"no crossing lies in the operating speeds, {own}; the nearest is {where} them, {told[0]}"
+        yield Verdict("trusted", why=why, remedy=MARGIN)
 
 
 def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float | None:

@@ -11,7 +11,7 @@ from stickslip.response.forced.choices import Rescue
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.aero import AeroTable
 from stickslip.study.file.model.contacts import ContactTable, JoinTable
-from stickslip.study.file.model.loads import Limits, LoadTable, Output, Retention, Rotation
+from stickslip.study.file.model.loads import Limits, LoadTable, Operation, Output, Retention, Rotation
 from stickslip.study.file.model.material import DampingTable, MaterialTable, StudyReduction
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import AnyPart, Copy
@@ -87,6 +87,7 @@ class Tables(Section):
     )
     load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
+    operation: Operation = Field(default_factory=Operation, description="the table [operation], where the machine runs")
     aero: AeroTable | None = Field(None, description="the table [aero], of aerodynamic influence coefficients")
     mistuning: dict[Name, MistuningTable] = Field(
         default_factory=dict, description="the tables [mistuning.NAME], of what differs from sector to sector"

@@ -36,7 +36,7 @@ from stickslip.analyses.forced_response.page.wheel import (
     wheel_at_peak,
     wheel_in_motion,
 )
-from stickslip.analyses.forced_response.records.columns import CaseNumbers
+from stickslip.analyses.forced_response.records.columns import CaseNumbers, OperatingRange, read
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.working_range import loss_at_peak
 from stickslip.arrays import FloatArray
@@ -151,6 +151,32 @@ def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
     return [f"Next: refine between {family[at - 1].label} and {family[at + 1].label}"]
 
 
+def _operation_card(response: Response) -> Card | None:
+    """Return whether the peaks lie in the operating range, or the smallest margin; None without a range."""
+    cases = [c for c in response.peaked if response.resonates(c)]
+    ranges = {c: read(OperatingRange, response.data, c.index) for c in cases}
+    cases = [c for c in cases if ranges[c].range.known]
+    if not cases:
+        return None
+    margins = {c: ranges[c].range.margin(ranges[c].shown(response.peak_hz(c))) for c in cases}
+    near = min(cases, key=lambda c: abs(margins[c]))
+    own = ranges[near].range
+    size, hz = Curve(response.data, near.index).largest_in_operation
+    told = (
+        f"{amplitude(size, response.length)} at {number(ranges[near].shown(hz), 5)} {own.unit}"
+        if np.isfinite(size)
+        else ""
+    )
+    note = f"range {own}{near.where}" + f"; largest there {told}" * bool(told)
+    if margins[near]:
+        return Card(
+            own.where(ranges[near].shown(response.peak_hz(near))), "margin of the peak to the operating range", note
+        )
+    inside = sum(not m for m in margins.values())
+    count = f"{inside} of {len(cases)} peaks" if len(cases) > 1 else "peak"
+    return Card("Inside", f"{count} in the operating range", note)
+
+
 def _shift_card(response: Response) -> Card | None:
     within = [c for c in response.peaked if response.resonates(c)]
     if len(within) < 2:
@@ -210,6 +236,7 @@ def cards(response: Response) -> list[Card]:
         _answer(response),
         _damping_card(response),
         _blade_card(response),
+        _operation_card(response),
         _shift_card(response),
         _loss_card(response),
     )

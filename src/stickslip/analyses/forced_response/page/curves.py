@@ -12,11 +12,12 @@ from stickslip.analyses.forced_response.page.bifurcations import located, mark_b
 from stickslip.analyses.forced_response.page.many_cases import Panel, extremes, panels
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.tractions import draw_bands
+from stickslip.analyses.forced_response.records.columns import OperatingRange, of_cases
 from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase
-from stickslip.report.plot import ALARM, DASHES, GRID, MUTED, Plot, key_marker, log_ticks, styled
+from stickslip.report.plot import ALARM, DASHES, GRID, MUTED, Plot, key_marker, log_ticks, shade, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.study.file.case_names import CASE
 from stickslip.study.verdict import POINT_LEVELS
@@ -297,6 +298,16 @@ def _many(response: Response) -> tuple[go.Figure, str]:
     return figure, f" Named: the smallest, the middle and the largest peak of {len(response.cases)} cases."
 
 
+def _shade_operation(figure: go.Figure, response: Response) -> str:
+    """Shade the operating range where all cases have the same; return the sentence for the caption, empty for none."""
+    own = [(r.operating_lowest_hz, r.operating_highest_hz) for r in of_cases(OperatingRange, response.data)]
+    if not np.isfinite(own).all() or len(set(own)) > 1:
+        return ""
+    over = float(np.nanmean(abscissa(response)[0] / response.hz))
+    shade(figure, over * own[0][0], over * own[0][1])
+    return " Shaded: the operating range."
+
+
 def frequency_response(response: Response) -> Plot | None:
     """Draw the responses of all cases, marked by the harmonics of each point (Gastaldi and Berruti 2017, fig. 4b).
 
@@ -329,6 +340,7 @@ def frequency_response(response: Response) -> Plot | None:
     if len(response.cases) == 1:
         figure.update_layout(legend_traceorder="normal")  # in one row below a narrow panel
     figure.update_xaxes(title_text=f"{name} ({unit})", row=rows if rows > 1 else None)
+    told += _shade_operation(figure, response)
     ticks = log_ticks(response.accepted * scale.factor)
     figure.update_yaxes(type="log", **ticks)
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", col=1 if len(shown) > 1 else None)

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import record_of
+from stickslip.analyses.operation import Operating
 from stickslip.arrays import FloatArray, IntArray, TextArray
 from stickslip.column import Column, column, columns_of
 from stickslip.response.forced.choices import Stage
@@ -515,6 +516,31 @@ class Jacobians:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class OperatingRange:
+    """Operating range of the machine, as frequencies of the excitation, and as speeds if these were given."""
+
+    operating_lowest_hz: float = column(
+        "Hz", "lowest operating frequency of the excitation, NaN without one", along="case"
+    )
+    operating_highest_hz: float = column("Hz", "highest operating frequency of the excitation", along="case")
+    operating_lowest_rpm: float = column(
+        "rpm", "lowest operating speed, NaN where frequencies were given", along="case"
+    )
+    operating_highest_rpm: float = column("rpm", "highest operating speed", along="case")
+
+    @property
+    def range(self) -> Operating:
+        """The range as it was given."""
+        if np.isfinite(self.operating_lowest_rpm):
+            return Operating(self.operating_lowest_rpm, self.operating_highest_rpm, "rpm")
+        return Operating(self.operating_lowest_hz, self.operating_highest_hz, "Hz")
+
+    def shown(self, hertz: float) -> float:
+        """Return a frequency of the excitation in the unit of the range."""
+        return hertz * self.range.lowest / self.operating_lowest_hz
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PhysicsVerdicts:
     """Verdicts on the physics of a case, which need the model."""
 
@@ -639,6 +665,7 @@ KINDS = (
     TimeChecks,
     MoreHarmonics,
     Jacobians,
+    OperatingRange,
     PhysicsVerdicts,
     MotionAtPeak,
     ModelChanges,

@@ -18,6 +18,7 @@ from stickslip.analyses.forced_response.records.columns import (
     Kind,
     ModelFacts,
     MoreHarmonics,
+    OperatingRange,
     PointFields,
     Points,
     PointStability,
@@ -280,6 +281,22 @@ class Curve:
     def peak_hz(self) -> float:
         """Frequency of the peak; NaN for none."""
         return float(self.hz[self.peak]) if self.peak >= 0 else float("nan")
+
+    @cached_property
+    def largest_in_operation(self) -> tuple[float, float]:
+        """Largest amplitude (m) in the operating range and its frequency (Hz): at a stable point, or between two at an end; NaN for none."""
+        own = self.read(OperatingRange)
+        known = self.converged & np.isfinite(self.amplitude)
+        known[self.unstable] = False
+        at = self.branch[known[self.branch]]
+        hz, size = self.hz[at], self.amplitude[at]
+        found = [(float(self.amplitude[i]), float(self.hz[i])) for i in np.flatnonzero(known)]
+        for end in (own.operating_lowest_hz, own.operating_highest_hz):
+            crossed = np.flatnonzero((hz[:-1] - end) * (hz[1:] - end) < 0.0)
+            share = (end - hz[crossed]) / (hz[crossed + 1] - hz[crossed])
+            found += [(float(y), end) for y in size[crossed] + share * (size[crossed + 1] - size[crossed])]
+        inside = [one for one in found if own.operating_lowest_hz <= one[1] <= own.operating_highest_hz]
+        return max(inside, default=(float("nan"), float("nan")))
 
     @cached_property
     def supports(self) -> list[tuple[int, ...]]:

@@ -17,6 +17,7 @@ from stickslip.analyses.forced_response.records.columns import (
     ModelChanges,
     MotionAtPeak,
     MotionsInTime,
+    OperatingRange,
     OtherMotions,
     PhysicsVerdicts,
     SideBranches,
@@ -25,6 +26,7 @@ from stickslip.analyses.forced_response.records.columns import (
     holds,
 )
 from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
+from stickslip.analyses.operation import MARGIN
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.choices import RUNGS
@@ -523,6 +525,7 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful", why, remedy)
 
 
+SAME_END = 1e-6  # relative difference of two frequencies that are the same end of a range
 COARSE = 0.5  # step over the half-power width above which a resonance may be missed: four points a width show each
 
 
@@ -553,6 +556,33 @@ def retention(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful", why, remedy)
 
 
+def operation(case: Curve) -> Iterator[Finding]:
+    """Note whether the peak lies in the operating range of the machine, or its margin, and the largest amplitude there."""
+    own = case.read(OperatingRange)
+    if not own.range.known or case.peak < 0:
+        return
+    low, high = (own.shown(hz) for hz in (case.numbers.lowest_hz, case.numbers.highest_hz))
+    left = [f"{own.range.lowest:.5g} to {low:.5g}"] * bool(own.range.lowest < low * (1 - SAME_END))
+    left += [f"{high:.5g} to {own.range.highest:.5g}"] * bool(own.range.highest > high * (1 + SAME_END))
+    if left:
+        why = f"the sweep leaves out {' and '.join(left)} {own.range.unit} of the operating range, {own.range}"
+        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
+    if case.at_the_end:  # no resonance: its own doubt
+        return
+    peak = own.shown(case.peak_hz)
+    where = own.range.where(peak)
+    here = f"{peak:.5g} {own.range.unit}"
+    if where == "inside":
+        why = f"the peak lies inside the operating range, {own.range}: {here}"
+        yield Finding("trusted", why, "The machine runs at this resonance: judge its amplitude, or shift it.")
+        return
+    why = f"the peak lies outside the operating range, {own.range}: {here} is {where} it"
+    size, hz = case.largest_in_operation
+    if np.isfinite(size):
+        why += f", and the largest amplitude in it is {millimetres(size)} at {own.shown(hz):.5g} {own.range.unit}"
+    yield Finding("trusted", why, MARGIN)
+
+
 def known_to_the_job(case: Curve) -> Iterator[Finding]:
     """Return the verdicts that the job stored because they need the model."""
     for v in from_json(case.read(KnownVerdicts).known_verdicts or "[]"):
@@ -561,6 +591,7 @@ def known_to_the_job(case: Curve) -> Iterator[Finding]:
 
 RULES: tuple[Rule, ...] = (
     known_to_the_job,
+    operation,
     unsolved,
     in_time,
     stability,

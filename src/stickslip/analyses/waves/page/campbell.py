@@ -10,7 +10,7 @@ from stickslip.analyses.waves.records import Campbell, contact_state, with_conta
 from stickslip.analyses.waves.verdicts import in_ranges
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table, Words
-from stickslip.report.plot import INK, MUTED, Plot, ring, styled
+from stickslip.report.plot import INK, MUTED, Plot, ring, shade, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
 from stickslip.study.verdict import together
@@ -163,6 +163,8 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     n = len(view.found.crossings)
     if n:
         figure.add_trace(_crossings(view))
+    if view.found.operating.known:
+        shade(figure, view.found.operating.lowest, view.found.operating.highest)
     styled(figure, 620)
     span = float(np.ptp(rpm))
     figure.update_xaxes(title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span])
@@ -172,7 +174,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, {with_contacts('in the frame that turns with the wheel', view.found.contacts)}. "
-        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{_not_shown(view, top)}"
+        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{' Shaded: the operating speeds.' * view.found.operating.known}{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 
@@ -188,6 +190,10 @@ def crossings(view: Waves[Campbell]) -> Table | Words:
         for w, c in sorted(view.found.crossings, key=lambda met: met[1].speed_rpm)
     ]
     head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
+    own = view.found.operating
+    if own.known:
+        met = sorted(c.speed_rpm for _, c in view.found.crossings)
+        head, rows = [*head, "operating speeds"], [[*row, own.where(rpm)] for row, rpm in zip(rows, met, strict=True)]
     return Table(head, rows, title)
 
 

@@ -8,7 +8,17 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from stickslip.response.forced.choices import AmplitudeOf
 from stickslip.study.file.model.bodies import Triple, axis_vector
-from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, shown
+from stickslip.study.file.section import (
+    FilePath,
+    Name,
+    Positive,
+    Range,
+    Section,
+    custom_error,
+    once,
+    rising_pair,
+    shown,
+)
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]
 Speed = Annotated[float, Field(ge=0, le=1e7)]  # rpm
@@ -115,6 +125,26 @@ class Rotation(Section):
     centrifugal: bool = Field(
         True, description="whether the centrifugal load of what rotates is a static load: true or false"
     )
+
+
+class Operation(Section):
+    """Where the machine runs. Answers say whether a resonance lies there, and the margin if not; nothing else depends on it."""
+
+    operating_hz: Range | None = Field(
+        None, description="operating range [lowest, highest] of the excitation in Hz, for [forced_response]"
+    )
+    operating_rpm: Range | None = Field(
+        None,
+        description="operating speeds [lowest, highest] in rpm, for [campbell], and for [forced_response] with an engine order",
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        rising_pair(self.operating_hz or [], "operating_hz")
+        rising_pair(self.operating_rpm or [], "operating_rpm", "speed")
+        if self.operating_hz and self.operating_rpm:
+            raise custom_error("cannot stand beside operating_hz", "Give one of them.", "operating_rpm")
+        return self
 
 
 class Point(Section):

@@ -1,0 +1,144 @@
+"""The operating range of a machine: inside, margins by hand, amplitudes there, and what is refused."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_result import synthetic_result
+
+import stickslip as ss
+from stickslip.analyses.forced_response.page.chapter import cards
+from stickslip.analyses.forced_response.page.curves import frequency_response
+from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.rules import operation
+from stickslip.analyses.operation import NONE, Operating, of_frequencies, of_speeds
+from stickslip.analyses.waves.verdicts import in_operation
+from stickslip.errors import InputError
+from stickslip.study.file.model.loads import Operation
+from stickslip.units import HZ, millimetres
+
+
+@pytest.mark.parametrize(
+    ("value", "margin", "told"),
+    [
+        (90.0, -0.1, "10 % below"),
+        (100.0, 0.0, "inside"),
+        (120.0, 0.0, "inside"),
+        (126.0, 0.05, "5 % above"),
+    ],
+)
+def test_a_margin_is_over_the_nearer_end(value: float, margin: float, told: str) -> None:
+    own = Operating(100.0, 120.0, "Hz")
+    assert own.margin(value) == pytest.approx(margin, abs=1e-15)
+    assert own.where(value) == told
+
+
+def test_speeds_become_frequencies_by_the_engine_order_or_are_refused() -> None:
+    asked = Operation(operating_rpm=[3000.0, 3600.0])
+    assert of_frequencies(asked, 4) == pytest.approx((200.0, 240.0))
+    assert of_speeds(asked) == Operating(3000.0, 3600.0, "rpm")
+    with pytest.raises(InputError, match=r"operation.operating_rpm: gives speeds .* Give operating_hz"):
+        of_frequencies(asked, None)
+    assert of_frequencies(Operation(operating_hz=[10.0, 20.0]), None) == (10.0, 20.0)
+    assert of_speeds(Operation(operating_hz=[10.0, 20.0])) == NONE
+    assert np.isnan(of_frequencies(Operation(), 4)).all()
+    for given, said in (
+        ({"operating_hz": [20.0, 10.0]}, "operating_hz"),
+        ({"operating_hz": [10.0, 20.0], "operating_rpm": [1.0, 2.0]}, "cannot stand beside operating_hz"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            Operation(**given)
+
+
+def ranged(low: float, high: float, *, rpm_per_hz: float = np.nan) -> tuple[xr.Dataset, Curve]:
+    """One case with an operating range in Hz, or in rpm."""
+    data = synthetic_result(ratios=(20,), n=24, verify=False)
+    values = {"lowest_hz": low, "highest_hz": high, "lowest_rpm": low * rpm_per_hz, "highest_rpm": high * rpm_per_hz}
+    swept = {
+        f"{end}_hz": ("case", [float(of(data["frequency_hz"]))])
+        for end, of in (("lowest", np.min), ("highest", np.max))
+    }
+    data = data.assign(swept).assign({f"operating_{name}": ("case", [value]) for name, value in values.items()})
+    return data, Curve(data, 0)
+
+
+def test_the_peak_is_told_with_its_place_and_the_largest_amplitude_in_the_range() -> None:
+    peak = ranged(1.0, 2.0)[1].peak_hz
+    (inside,) = operation(ranged(0.99 * peak, 1.01 * peak)[1])
+    assert (inside.level, inside.points) == ("trusted", ())
+    assert inside.why.startswith("the peak lies inside the operating range, ")
+    # the range begins between two points above the peak: the amplitude there is on the straight line between them
+    _, case = ranged(1.0, 2.0)
+    order = np.argsort(case.hz)
+    k = int(np.flatnonzero(case.hz[order] > peak)[1])
+    (a, b), (y, z) = case.hz[order][k : k + 2], case.amplitude[order][k : k + 2]
+    start = 0.75 * a + 0.25 * b
+    data, case = ranged(start, float(case.hz.max()))
+    assert case.largest_in_operation == pytest.approx((0.75 * y + 0.25 * z, start))
+    (outside,) = operation(case)
+    assert f"{peak:.5g} Hz is {100 * (1 - peak / start):.2g} % below it" in outside.why
+    assert f"at {start:.5g} Hz" in outside.why
+    response = Response(data)
+    card = next(c for c in cards(response) if c.label == "margin of the peak to the operating range")
+    assert card.value == f"{100 * (1 - peak / start):.2g} % below"
+    figure = frequency_response(response)
+    assert figure is not None
+    (band,) = figure.figure.layout.shapes
+    assert (band.x0, band.x1) == pytest.approx((start, case.hz.max()))
+    assert "Shaded: the operating range." in figure.caption
+
+
+def test_a_range_in_speeds_is_told_in_speeds_and_what_is_not_swept_is_doubted() -> None:
+    _, plain = ranged(1.0, 2.0)
+    low, high = plain.numbers.lowest_hz, plain.numbers.highest_hz
+    left, found = operation(ranged(0.9 * low, high, rpm_per_hz=15.0)[1])
+    assert left.level == "doubtful"
+    assert left.why.startswith(
+        f"the sweep leaves out {0.9 * low * 15:.5g} to {low * 15:.5g} rpm of the operating range"
+    )
+    assert found.why.endswith(f"{15 * plain.peak_hz:.5g} rpm")
+    assert [f.level for f in operation(ranged(low, high)[1])] == ["trusted"]
+    assert list(operation(Curve(synthetic_result(ratios=(20,), n=24, verify=False), 0))) == []
+
+
+def test_crossings_are_held_against_the_operating_speeds() -> None:
+    def diagram(low: float, high: float) -> Any:
+        met = [(0, SimpleNamespace(engine_order=m, mode=0, speed_rpm=v)) for m, v in ((6, 5920.9), (8, 5038.3))]
+        waves = [SimpleNamespace(wave_number=6, nodal_diameter=6, kind="forward")]
+        speeds = np.array([0.0, 6000.0])
+        return SimpleNamespace(
+            operating=Operating(low, high, "rpm"), speeds_rpm=speeds, crossings=met, waves=waves, sectors=24
+        )
+
+    (outside,) = in_operation(diagram(5200.0, 5900.0))
+    assert "the nearest is 0.35 % above them, EO 6" in outside.why
+    (inside,) = in_operation(diagram(5000.0, 5950.0))
+    assert inside.why.startswith("2 crossings inside the operating speeds, 5000 to 5950 rpm: EO")
+    beyond, _ = in_operation(diagram(5000.0, 6100.0))
+    assert (beyond.level, beyond.remedy) == ("doubtful", "Widen campbell.speeds_rpm.")
+    assert list(in_operation(diagram(np.nan, np.nan))) == []
+
+
+def test_the_amplitude_at_the_end_of_the_range_is_that_of_the_oscillator() -> None:
+    """One mass with 2 % damping, driven by 1 N: resonance at 15.9 Hz below the range, the largest amplitude there at its lower end."""
+    body = ss.model.lumped(np.eye(1), 1e4 * np.eye(1), np.eye(1) * 4.0, names=("m",))
+    model = ss.Model(
+        parts={"one": ss.Part(structure=body)},
+        loads={"f": ss.Load(on="one.m", newton=1.0)},
+        outputs=(ss.Output(name="m", on="one.m"),),
+    )
+    found = model.forced_response(frequency_hz=[12.0, 22.0], points=200, operating_hz=[18.0, 21.0], stability="off")
+    data = found["forced_response"]
+    assert data.operating_lowest_hz.values.tolist() == [18.0]
+    assert data.operating_highest_hz.values.tolist() == [21.0]
+    assert np.isnan([*data.operating_lowest_rpm.values, *data.operating_highest_rpm.values]).all()
+    size, hz = Curve(data, 0).largest_in_operation
+    omega = 18.0 * HZ
+    assert hz == 18.0
+    assert size == pytest.approx(1.0 / abs(1e4 - omega**2 + 4j * omega), rel=2e-3)  # straight between points
+    told = next(str(v) for v in found.verdicts if "operating range" in str(v))
+    margin = 100 * (1 - data.peak_frequency_hz.item() / 18.0)
+    assert f"{margin:.2g} % below it, and the largest amplitude in it is {millimetres(size)} at 18 Hz" in told
