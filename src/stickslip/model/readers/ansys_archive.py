@@ -57,7 +57,7 @@ BEYOND_VIBRATION = {
 WITHOUT_STIFFNESS = {154, 200}  # surface effect elements for pressures, and mesh-only elements
 
 
-def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> SolidMesh:
+def read_ansys_archive(path: Path | str, *, units: Units | None = None, linked: bool = False) -> SolidMesh:
     """Read the solid elements of an ANSYS archive.
 
     Parameters
@@ -66,6 +66,8 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
         The ``.cdb`` file: ``CDWRITE,DB,model,cdb`` with elements of the types SOLID185, SOLID186 or SOLID187.
     units
         Unit system of the model, SI by default: the file does not say.
+    linked
+        Whether equations (CE) and couplings (CP) other than pairs of nodes are accepted: the mesh does not have them, a study reads them.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     if len(missing):
         raise input_error(str(path), f"has elements at node {missing[0]}, which is not there", CUT_SHORT)
     points = blocks.points[order][np.searchsorted(numbers, used)]
-    named = dict(blocks.node_sets) | dict(zip(COUPLED, _coupled(blocks).T, strict=True))
+    named = dict(blocks.node_sets) | dict(zip(COUPLED, _coupled(blocks, linked=linked).T, strict=True))
     sets = {name: np.flatnonzero(np.isin(used, members)) for name, members in named.items()}
     return SolidMesh(
         units.length * points,
@@ -163,7 +165,7 @@ def ansys_speed(path: Path, units: Units) -> float:
     return speed
 
 
-def _coupled(blocks: Blocks) -> IntArray:
+def _coupled(blocks: Blocks, *, linked: bool) -> IntArray:
     """Return the (k, 2) numbers of nodes coupled in pairs (CP); refuse other couplings and constraint equations."""
     pairs: dict[tuple[int, int], None] = {}
     for place, (command, *words) in blocks.commands:
@@ -171,10 +173,12 @@ def _coupled(blocks: Blocks) -> IntArray:
             continue
         nodes = words[2:] if command.upper() == "CP" else []
         if len(nodes) != 2 or not all(map(is_whole, nodes)):
+            if linked:
+                continue
             raise input_error(
                 place,
-                f"constrains the model ({command.upper()}), and only coupled pairs of nodes are read (CP)",
-                "Delete it (CEDELE, CPDELE), or let ANSYS write its matrices (read_ansys_full).",
+                f"constrains the model ({command.upper()}), and a mesh has coupled pairs of nodes alone (CP)",
+                "Use the archive in a study, which reads equations; delete it (CEDELE, CPDELE), or let ANSYS write its matrices.",
             )
         pairs[int(nodes[0]), int(nodes[1])] = None
     return np.array([*pairs], dtype=np.int64).reshape(-1, 2)

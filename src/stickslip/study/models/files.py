@@ -24,6 +24,7 @@ from stickslip.model.readers.ansys_archive import (
     ansys_speed,
     read_ansys_archive,
 )
+from stickslip.model.readers.ansys_equations import read_ansys_links
 from stickslip.model.readers.ansys_materials import ansys_cell_materials
 from stickslip.model.readers.calculix_deck import Deck, held_like_partners, read_deck
 from stickslip.model.readers.frd import read_displacement
@@ -262,13 +263,17 @@ def _materials(deck: Deck) -> Materials:
 
 
 def _from_archive(key: str, table: FileModel, path: Path, given: Materials | None, others: dict[str, Any]) -> Part:
-    mesh = read_ansys_archive(path, units=_units(table))
+    mesh = read_ansys_archive(path, units=_units(table), linked=True)
     if given is None:
         numbers = mesh.cell_numbers.tolist()
         found = ansys_cell_materials(path, numbers, _units(table), plausible=table.plausible)
         given = found if len(set(found)) > 1 else found[0]
     sectors = _sectors(key, table)
     mesh = _cyclic_pairs(key, mesh, sectors, table.axis() or Axis())
+    links = read_ansys_links(path, mesh, cyclic=sectors > 1)
+    if links is not None and sectors > 1:
+        sets = with_sets(key, table.sets, mesh.points, mesh.numbers, mesh.node_sets)
+        links = replace(links, lasting=np.concatenate([sets[name] for name in _faces(key, table, sets, sectors)]))
     quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
     return _solid(
         key,
@@ -278,6 +283,7 @@ def _from_archive(key: str, table: FileModel, path: Path, given: Materials | Non
         sectors,
         None,
         quadrature=quadrature,
+        links=links,
         warnings=tuple(f"{table.file}: passed over {text}" for text in ansys_passed_over(path)),
         own_speed=ansys_speed(path, _units(table)),
         **others,
@@ -298,8 +304,10 @@ def _cyclic_pairs(key: str, mesh: SolidMesh, sectors: int, axis: Axis) -> SolidM
     if len(sets) == len(mesh.node_sets):
         return mesh
     near = PITCH * float(np.ptp(mesh.points, axis=0).max())
-    on_axis = np.flatnonzero(np.linalg.norm(axis.arm(mesh.points), axis=1) < near)
     one, other = (mesh.node_sets[name] for name in COUPLED)
+    if sectors == 1 and cKDTree(mesh.points[other]).query(mesh.points[one])[0].max() < near:
+        return replace(mesh, node_sets=sets)  # equations of nodes at one place, see read_ansys_links
+    on_axis = np.flatnonzero(np.linalg.norm(axis.arm(mesh.points), axis=1) < near)
     for low, high in ((one, other), (other, one)):
         moved = axis.turned(mesh.points[low], 2 * np.pi / sectors)
         distance, _ = cKDTree(mesh.points[high]).query(moved)
