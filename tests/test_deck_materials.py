@@ -123,3 +123,51 @@ def test_a_written_deck_is_read_again(tmp_path, where):
 def test_other_orientations_are_refused_by_line(tmp_path, axes, message):
     with pytest.raises(InputError, match=message):
         deck_of(tmp_path, text("ORTHO", axes=axes))
+
+
+HEATED = (
+    CUBE.replace(
+        "2.1e11, 0.3\n", "2.1e11, 0.3, 20.\n1.4e11, 0.3, 720.\n*EXPANSION, ZERO=25.\n1.e-5, 20.\n1.4e-5, 720.\n"
+    )
+    + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 40.\n"
+)
+
+
+def test_temperatures_of_a_deck_are_initial_ones_and_those_of_its_steps(tmp_path):
+    steps = "*STEP\n*STATIC\n*TEMPERATURE\nNALL, 300.\nTOP, 500.\n7, 600.\n*END STEP\n"
+    deck = deck_of(tmp_path, HEATED + steps)
+    assert deck.temperature.start.tolist() == [40.0] * 8
+    assert deck.temperature.values.tolist() == [500.0] * 6 + [600.0, 500.0]  # TOP names BOTTOM, too
+    expansion = deck.material.expansion
+    assert (expansion.kind, expansion.zero) == ("secant", 25.0)
+    assert expansion.coefficients.at(np.array([370.0]))[0, 0] == pytest.approx(1.2e-5)
+    assert deck_of(tmp_path, HEATED).temperature.values.tolist() == [40.0] * 8
+    anew = deck_of(tmp_path, HEATED + steps + "*STEP\n*TEMPERATURE, OP=NEW\n3, 90.\n*END STEP\n")
+    assert anew.temperature.values.tolist() == [40.0, 40.0, 90.0] + [40.0] * 5
+
+
+def test_a_deck_at_rest_has_its_initial_temperature(tmp_path):
+    cold = CUBE.replace("2.1e11, 0.3", f"{2.1e11 - 0.7e11 * 20 / 700!r}, 0.3")
+    hz = natural_frequencies(assemble_deck(deck_of(tmp_path, cold)), 3)
+    steps = "*STEP\n*STATIC\n*TEMPERATURE\nNALL, 300.\n*END STEP\n"
+    np.testing.assert_allclose(natural_frequencies(assemble_deck(deck_of(tmp_path, HEATED + steps)), 3), hz, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("NALL, 40.", "TOP, 40.", None),
+        ("NALL, 40.", "7, 40.", r"\*INITIAL CONDITIONS: 7 nodes have no initial temperature, e\.g\. 1"),
+        ("NALL, 40.", "NALL", "names no temperature"),
+        ("TYPE=TEMPERATURE", "TYPE=TEMPERATURE, FILE=x.frd", "temperatures of a file or a subroutine"),
+        ("ZERO=25.", "ZERO=25., TYPE=ANISO", "TYPE=ANISO is not read"),
+        ("ZERO=25.", "ZERO=warm", "ZERO 'warm' is no finite number"),
+    ],
+)
+def test_heat_that_is_not_read_is_refused_by_line(tmp_path, old, new, message):
+    text = HEATED.replace(old, new)
+    if message is None:
+        assert deck_of(tmp_path, text).temperature is not None
+        return
+    with pytest.raises(InputError, match=message):
+        deck_of(tmp_path, text)

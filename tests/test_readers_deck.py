@@ -227,11 +227,10 @@ def test_contacts_of_a_deck_are_told(tmp_path):
 def test_loads_and_what_is_beyond_small_vibration_are_told(tmp_path):
     more = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 20.\n"
     deck = deck_of(tmp_path, CUBE + "*EXPANSION\n1.e-5\n*CLOAD\n7, 1, 5.\n" + more)
-    assert deck.ignored[:3] == (
-        "*EXPANSION (deck.inp: line 33)",
-        "*CLOAD (deck.inp: line 35)",
-        "*INITIAL CONDITIONS, TYPE=TEMPERATURE (deck.inp: line 37)",
-    )
+    assert deck.ignored[0] == "*CLOAD (deck.inp: line 35)"
+    assert "TEMPERATURE" not in " ".join(deck.ignored)
+    deck = deck_of(tmp_path, CUBE + more)
+    assert deck.ignored[-1].endswith("line 33, *INITIAL CONDITIONS, on which no material depends")
     deck = deck_of(tmp_path, CUBE + "*DLOAD, AMPLITUDE=RAMP\nEALL, CENTRIF, 1.E4, 0.,0.,0., 0.,0.,1.\n")
     assert deck.ignored[0].startswith("AMPLITUDE of *DLOAD")
 
@@ -394,7 +393,6 @@ def test_files_of_data_obey_the_rules_of_include(tmp_path):
         ("2.1e11, 0.3", "2.1e11", r"needs 2 numbers, got 1"),
         ("2.1e11, 0.3", "2.1e11, 0.3\n2.0e11, 0.3, 400.", "several rows without temperatures"),
         ("2.1e11, 0.3", "2.1e11, 0.3, 20.\n2.0e11, 0.3, 10.", r"temperatures \[20\.0, 10\.0\], which do not rise"),
-        ("2.1e11, 0.3", "2.1e11, 0.3, 20.\n2.0e11, 0.3, 400.", "has 2 temperatures"),
         ("*ELASTIC", "*ELASTIC, TYPE=ORTHO", "line 27: needs 9 numbers, got 2"),
         ("*ELASTIC", "*ELASTIC, TYPE=LAMINA", r"line 26, \*ELASTIC: TYPE=LAMINA is not read"),
         (

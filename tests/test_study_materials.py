@@ -150,3 +150,89 @@ def test_the_check_of_a_crystal_runs(folder):
     done = CliRunner().invoke(app, ["check", str(path)])
     assert done.exit_code == 0, done.output
     assert isinstance(read_study(path).model().parts["blade"].solid.material, ElasticMaterial)
+
+
+STEEL = "density_kg_per_m3 = 7850.0\n"
+ROWS = """expansion = "secant"
+expansion_zero_c = 25.0
+[[part.blade.material.over_temperature]]
+temperature_c = 20.0
+young_modulus_pa = 210e9
+poisson_ratio = 0.3
+expansion_per_k = 1.0e-5
+[[part.blade.material.over_temperature]]
+temperature_c = 720.0
+young_modulus_pa = 140e9
+poisson_ratio = 0.3
+expansion_per_k = 1.4e-5
+"""
+
+
+def part_of(folder, material, temperature):
+    more = f"[part.blade.temperature]\n{temperature}\n[modes]\nnumber = 2\n" if temperature else "[modes]\nnumber = 2\n"
+    return read_study(study(folder, material, more)).model().parts["blade"]
+
+
+def test_constants_over_temperature_are_those_of_the_part(folder):
+    part = part_of(folder, STEEL + ROWS, "uniform_c = 370.0\nstress_free_c = 25.0")
+    assert part.solid.laws.each[0] == Material(young_modulus=175e9, poisson_ratio=0.3, density=7850.0)
+    assert part.solid.heated
+    strain = part.solid.material.expansion.strain(np.array([25.0]), np.array([370.0]))
+    assert strain[0, 0] == pytest.approx(1.2e-5 * 345)
+
+
+def test_temperatures_follow_the_radius_the_nodes_or_a_factor(folder):
+    part = part_of(folder, STEEL + ROWS, "radius_m = [0.0, 0.05]\nat_radius_c = [100.0, 600.0]\nfactor = 0.5")
+    radius = np.linalg.norm(part.mesh.points[:, :2], axis=1)
+    expected = 20 + 0.5 * (100 + 1e4 * np.minimum(radius, 0.05) - 20)
+    np.testing.assert_allclose(part.solid.temperature.values, expected)
+    rows = "".join(f"{n},{300 + n}\n" for n in part.mesh.numbers[::-1])
+    (folder / "heat.csv").write_text(f"node,temperature_c\n{rows}")
+    part = part_of(folder, STEEL + ROWS, 'file = "heat.csv"')
+    np.testing.assert_allclose(part.solid.temperature.values, 300 + part.mesh.numbers)
+    (folder / "short.csv").write_text("node,temperature_c\n1,20.0\n")
+    with pytest.raises(InputError, match=r"short\.csv: lacks the temperature of \d+ nodes"):
+        part_of(folder, STEEL + ROWS, 'file = "short.csv"')
+
+
+def test_one_table_heats_what_can_be_heated(folder):
+    heat = "[temperature]\nuniform_c = 400.0\n[modes]\nnumber = 2\n"
+    cold = read_study(study(folder, STEEL, heat)).model().parts["blade"].solid
+    assert cold.temperature is None
+    hot = read_study(study(folder, f"{STEEL}expansion_per_k = 1e-5\n", heat)).model()
+    assert hot.heated
+    moved = hot.static_displacement(0.0)["blade"]
+    assert 0.9 < np.ptp(moved[:, 0]) / (1e-5 * 380 * 0.06) < 1.1
+    assert not np.allclose(hot.at(0.0).stiffness.toarray(), cold.structure.stiffness.toarray(), rtol=1e-4)
+
+
+def test_the_factor_of_a_temperature_is_varied(folder):
+    more = "[part.blade.temperature]\nuniform_c = 520.0\n[modes]\nnumber = 1\n[vary]\npart.blade.temperature.factor = [0.0, 1.0]\n"
+    whole = read_study(study(folder, STEEL + ROWS, more))
+    cold, hot = (whole.model(case).parts["blade"].solid.laws.each[0].young_modulus for case in (0, 1))
+    assert (cold, hot) == pytest.approx((210e9, 160e9))
+
+
+@pytest.mark.parametrize(
+    ("material", "temperature", "message"),
+    [
+        (ROWS, "", r"part\.blade\.temperature: is missing, and its material depends on temperature"),
+        (
+            ROWS.replace('expansion = "secant"\n', ""),
+            "uniform_c = 1.0",
+            "expansion: is missing with coefficients over temperature",
+        ),
+        (ROWS.replace("expansion_zero_c = 25.0\n", ""), "uniform_c = 1.0", "expansion_zero_c: is missing with secant"),
+        (ROWS.replace('"secant"', '"instantaneous"'), "uniform_c = 1.0", "expansion_zero_c: belongs to secant"),
+        ("young_modulus_pa = 2e11\n" + ROWS, "uniform_c = 1.0", "young_modulus_pa: is given over temperature, too"),
+        (ROWS.replace("720.0", "10.0"), "uniform_c = 1.0", "over_temperature: must have rising temperatures"),
+        (ROWS.replace("poisson_ratio = 0.3\n", "", 1), "uniform_c = 1.0", "poisson_ratio: is missing beside the other"),
+        (ROWS, "uniform_c = 1.0\nfile = 'x.csv'", "file: is given together with uniform_c"),
+        (ROWS, "radius_m = [0.1, 0.2]", "at_radius_c: is missing beside the other"),
+        (ROWS, "factor = 0.5", r"part\.blade\.temperature: gives no temperature"),
+        ('expansion = "secant"', "uniform_c = 1.0", "expansion: belongs to coefficients over temperature"),
+    ],
+)
+def test_temperatures_that_do_not_fit_are_refused(folder, material, temperature, message):
+    with pytest.raises(InputError, match=message):
+        part_of(folder, STEEL + material, temperature)

@@ -14,9 +14,10 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
+from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.elements import EXACT, Quadrature, Rules
 from stickslip.model.fe.links import Links, eliminate
-from stickslip.model.fe.material import AnyMaterial
+from stickslip.model.fe.material import AnyMaterial, ElasticMaterial
 from stickslip.model.fe.solid import integrate, support
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.deck_links import SUPPORT, links_of_mesh
@@ -65,6 +66,9 @@ class Deck:
         Equations, point masses, springs and dashpots; None without any.
     told
         What the equations do beyond their words, with their lines: those that follow from others, those that hold a dof.
+    temperature
+        Temperatures of the nodes: initial ones without thermal strain, and those of the last step; None without any, or if no
+        material depends on them.
     """
 
     mesh: SolidMesh
@@ -80,6 +84,7 @@ class Deck:
     of_abaqus: bool = False
     links: Links | None = None
     told: tuple[str, ...] = ()
+    temperature: Temperature | None = None
 
     @property
     def element_type(self) -> str:
@@ -194,6 +199,11 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
         if kind not in (*QUADRATURES, "C3D5"):
             model.ignored.append(f"what makes {kind} another element than its plain kind")
     square = model.speed_squares[-1] if model.speed_squares else None
+    used = np.isin(np.arange(len(mesh.points)), mesh.cells)
+    depends = any(isinstance(m, ElasticMaterial) and (m.varies or m.expansion) for m in materials.values())
+    heat = model.heat.of_nodes(mesh.numbers, used) if depends else None
+    if not depends:
+        model.ignored += [f"{place}, on which no material depends" for place in model.heat.places]
     return Deck(
         replace(mesh, node_sets=node_sets),
         model.kinds,
@@ -208,6 +218,7 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
         model.of_abaqus,
         links,
         () if links is None else _of_equations(links, held),
+        heat,
     )
 
 
@@ -226,7 +237,7 @@ def _of_equations(links: Links, held: BoolArray) -> tuple[str, ...]:
 
 
 def assemble_deck(deck: Deck) -> Structure:
-    """Assemble mass and stiffness of a deck at rest, supports applied, cyclic faces untied.
+    """Assemble mass and stiffness of a deck at rest and at its initial temperature, supports applied, cyclic faces untied.
 
     Parameters
     ----------
@@ -239,7 +250,8 @@ def assemble_deck(deck: Deck) -> Structure:
         Sparse, undamped. Each node set becomes a set of dofs, without supported ones.
     """
     materials = [deck.materials[name] for name in deck.cell_material]
-    mass, stiffness = integrate(deck.mesh, materials, deck.quadrature, deck.links)
+    cold = None if deck.temperature is None else Temperature(deck.temperature.start, deck.temperature.start)
+    mass, stiffness = integrate(deck.mesh, materials, deck.quadrature, deck.links, cold)
     return support(deck.mesh, mass, stiffness, ("root",), deck.held, deck.links)[0]
 
 
@@ -256,7 +268,9 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Any
                 raise unknown(place, "orientation", axes, list(model.orientations))
             orientation = read_orientation(model.orientations[axes], units)
         try:
-            materials[_in_axes(name, axes)] = material_of(model.elastic[name], model.density[name], orientation, units)
+            materials[_in_axes(name, axes)] = material_of(
+                model.elastic[name], model.density[name], model.expansion.get(name), orientation, units
+            )
         except InputError as error:
             raise error.inside(f"{place}: material {name!r}") from None
         own = materials[_in_axes(name, axes)]

@@ -1,17 +1,19 @@
 """Materials of a CalculiX or Abaqus deck: elasticity of any symmetry, density, and orientations."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
+from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.material import (
     AnyMaterial,
     ByTemperature,
     ElasticMaterial,
+    Expansion,
     Material,
     Orientation,
     orthotropic_stiffness,
@@ -51,6 +53,11 @@ class Constants:
     temperatures: tuple[float, ...]
     place: str
 
+    @property
+    def over_temperature(self) -> ByTemperature:
+        """The constants as a table."""
+        return ByTemperature(self.rows, self.temperatures if len(self.rows) > 1 else ())
+
 
 def read_constants(block: Block) -> Constants:
     """Read the data of ``*ELASTIC`` or ``*DENSITY``.
@@ -69,6 +76,11 @@ def read_constants(block: Block) -> Constants:
                 block.place, f"TYPE={given} is not read", "Use ISO, ENGINEERING CONSTANTS, ORTHO or ANISO."
             )
         kind, count = found[0], CONSTANTS[found[0]]
+    return _rows(block, kind, count)
+
+
+def _rows(block: Block, kind: str, count: int) -> Constants:
+    """Read rows of `count` constants with their temperatures, eight numbers a line."""
     lines = list(block.rows())
     each = math.ceil(count / A_LINE)
     rows, temperatures, place = [], [], block.place
@@ -89,6 +101,70 @@ def read_constants(block: Block) -> Constants:
     if not np.all(np.diff(temperatures) > 0):
         raise input_error(place, f"has the temperatures {temperatures}, which do not rise", "Give the lowest first.")
     return Constants(kind, tuple(rows), tuple(temperatures), block.place)
+
+
+@dataclass
+class DeckHeat:
+    """Temperatures of nodes: initial ones, and those of steps, each as nodes and a value, in the order of the deck."""
+
+    initial: list[tuple[IntArray, float]] = field(default_factory=list)
+    later: list[tuple[IntArray, float]] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)
+
+    def of_nodes(self, numbers: IntArray, used: BoolArray) -> Temperature | None:
+        """Return the temperatures of the nodes with these numbers; None if the deck has none.
+
+        Raises
+        ------
+        InputError
+            If nodes that are `used` by cells have no initial temperature.
+        """
+        if not self.places:
+            return None
+        start = _over(np.full(len(numbers), np.nan), numbers, self.initial)
+        missing = np.flatnonzero(np.isnan(start) & used)
+        if missing.size:
+            raise input_error(
+                self.places[0],
+                f"{missing.size} nodes have no initial temperature, e.g. {numbers[missing[0]]}",
+                "Name them in *INITIAL CONDITIONS, TYPE=TEMPERATURE: thermal strain counts from there.",
+            )
+        return Temperature(_over(start, numbers, self.later), start)
+
+
+def _over(field: FloatArray, numbers: IntArray, given: list[tuple[IntArray, float]]) -> FloatArray:
+    """Return a field over nodes in which later values replace earlier ones."""
+    found = field.copy()
+    if given:
+        nodes = np.concatenate([own for own, _ in given])
+        values = np.repeat([value for _, value in given], [len(own) for own, _ in given])
+        last = len(nodes) - 1 - np.unique(nodes[::-1], return_index=True)[1]
+        order = np.argsort(numbers, kind="stable")
+        place = np.minimum(np.searchsorted(numbers, nodes[last], sorter=order), len(numbers) - 1)
+        here = numbers[order[place]] == nodes[last]
+        found[order[place[here]]] = values[last[here]]
+    return found
+
+
+def read_expansion(block: Block) -> Expansion:
+    """Read ``*EXPANSION``: secant coefficients, which count from ``ZERO`` (0 if left out, as the manuals say).
+
+    Raises
+    ------
+    InputError
+        If the type is not read, or coefficients or temperatures are missing.
+    """
+    kind = "".join(block.parameters.get("TYPE", "ISO").upper().split())
+    counts = {"ISO": 1, "ORTHO": 3}
+    found = [word for word in counts if kind.startswith(word)]
+    if not found:
+        raise input_error(block.place, f"TYPE={kind} is not read", "Use ISO or ORTHO.")
+    zero = block.parameters.get("ZERO")
+    given = _rows(block, "EXPANSION", counts[found[0]])
+    return Expansion(
+        coefficients=given.over_temperature,
+        zero=0.0 if not zero else real_number(zero, block.place, "temperature ZERO"),
+    )
 
 
 def read_orientation(block: Block, units: Units) -> Orientation:
@@ -138,27 +214,35 @@ def _nested(matrix: FloatArray) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def material_of(elastic: Constants, density: Constants, orientation: Orientation | None, units: Units) -> AnyMaterial:
+def material_of(
+    elastic: Constants,
+    density: Constants,
+    expansion: Expansion | None,
+    orientation: Orientation | None,
+    units: Units,
+) -> AnyMaterial:
     """Return the material of a section in SI.
 
     Raises
     ------
     InputError
-        If the constants belong to no stable material, are implausible, or depend on temperature.
+        If the constants belong to no stable material.
     """
-    if len(elastic.rows) > 1 or len(density.rows) > 1:
-        place = (elastic if len(elastic.rows) > 1 else density).place
-        raise input_error(
-            place, f"has {max(len(elastic.rows), len(density.rows))} temperatures, which are not read", "Give one row."
-        )
-    mass = units.density * density.rows[0][0]
+    mass = ByTemperature(
+        tuple((units.density * row[0],) for row in density.rows), density.over_temperature.temperatures
+    )
+    own: tuple[tuple[float, ...], ...]
     if elastic.kind == "ISO":
-        modulus, ratio = elastic.rows[0]
-        return Material(young_modulus=units.stress * modulus, poisson_ratio=ratio, density=mass)
+        own = tuple((units.stress * modulus, ratio) for modulus, ratio in elastic.rows)
+        if len(own) == 1 and not mass.varies and expansion is None:
+            return Material(young_modulus=own[0][0], poisson_ratio=own[0][1], density=mass.values[0][0])
+    else:
+        own = tuple(_row(elastic, row, units) for row in elastic.rows)
     return ElasticMaterial(
-        elastic=ByTemperature(tuple(_row(elastic, row, units) for row in elastic.rows)),
-        density_table=ByTemperature(((mass,),)),
+        elastic=ByTemperature(own, elastic.over_temperature.temperatures),
+        density_table=mass,
         orientation=orientation or Orientation(),
+        expansion=expansion,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.fe.material import Expansion
 from stickslip.model.readers.deck_links import (
     POINT_KINDS,
     SUPPORT,
@@ -18,7 +19,7 @@ from stickslip.model.readers.deck_links import (
     read_rigid_body,
     read_transform,
 )
-from stickslip.model.readers.deck_materials import Constants, read_constants
+from stickslip.model.readers.deck_materials import Constants, DeckHeat, read_constants, read_expansion
 from stickslip.model.readers.deck_words import (
     ABAQUS_WORDS,
     DAMPING,
@@ -61,6 +62,8 @@ class DeckModel:
     element_sets: dict[str, IntArray] = field(default_factory=dict)
     elastic: dict[str, Constants] = field(default_factory=dict)
     density: dict[str, Constants] = field(default_factory=dict)
+    expansion: dict[str, Expansion] = field(default_factory=dict)
+    heat: DeckHeat = field(default_factory=DeckHeat)
     orientations: dict[str, Block] = field(default_factory=dict)
     sections: list[tuple[str, str, str, str]] = field(default_factory=list)  # material, orientation or "", set, place
     fixed: dict[str, list[IntArray]] = field(default_factory=lambda: {"x": [], "y": [], "z": []})
@@ -105,7 +108,7 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
             block.check_parameters()
             if word == "MATERIAL":
                 material = block.parameter("NAME").upper()
-            elif word in ("ELASTIC", "DENSITY"):
+            elif word in ("ELASTIC", "DENSITY", "EXPANSION"):
                 _material(model, block, material)
             elif word in _ACTIONS:
                 _ACTIONS[word](model, block)
@@ -250,6 +253,9 @@ def _connectivity(model: DeckModel, block: Block, count: int) -> Iterator[list[i
 def _material(model: DeckModel, block: Block, material: str) -> None:
     if not material:
         raise input_error(block.place, "belongs to no *MATERIAL", "Put it below its material.")
+    if block.keyword == "EXPANSION":
+        model.expansion[material] = read_expansion(block)
+        return
     table = model.elastic if block.keyword == "ELASTIC" else model.density
     table[material] = read_constants(block)
 
@@ -392,7 +398,32 @@ def _initial(model: DeckModel, block: Block) -> None:
     kind = block.parameter("TYPE").upper()
     if kind not in PASSING_CONDITIONS:
         raise unread(block, f"initial conditions of TYPE={kind} change the stiffness")
+    if kind == "TEMPERATURE":
+        if {"USER", "FILE"} & block.parameters.keys():
+            raise unread(block, "temperatures of a file or a subroutine are not read")
+        for place, fields in block.rows():
+            model.heat.initial.append(_temperatures(model, place, fields))
+        model.heat.places.append(block.place)
+        return
     model.ignored.append(f"*INITIAL CONDITIONS, TYPE={kind} ({block.path.name}: line {block.line})")
+
+
+def _temperatures(model: DeckModel, place: str, fields: list[str]) -> tuple[IntArray, float]:
+    """Read ``node or set, temperature``."""
+    if len(fields) < 2:
+        raise input_error(place, "names no temperature", "Write node or set, temperature.")
+    return nodes_named(model, fields[0], place), real_number(fields[1], place, "temperature")
+
+
+def _heating(model: DeckModel, block: Block) -> None:
+    """Read temperatures of a step; nodes without one keep their initial temperature."""
+    if _anew(block):
+        model.heat.later = []
+    rows = [_temperatures(model, place, fields) for place, fields in block.rows()]
+    if rows and "AMPLITUDE" in block.parameters:
+        model.ignored.append(f"AMPLITUDE of *TEMPERATURE ({block.path.name}: line {block.line}): taken whole")
+    model.heat.later += rows
+    model.heat.places.append(block.place)
 
 
 def _step(model: DeckModel, block: Block) -> None:
@@ -459,6 +490,7 @@ _ACTIONS = {
     "DASHPOT": _point_property,
     "SOLID SECTION": _section,
     "ORIENTATION": _orientation,
+    "TEMPERATURE": _heating,
     "BOUNDARY": _boundary,
     "DLOAD": _distributed_load,
     "STEP": _step,

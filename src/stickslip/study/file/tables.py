@@ -12,7 +12,7 @@ from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.model.aero import AeroTable
 from stickslip.study.file.model.contacts import ContactTable, JoinTable
 from stickslip.study.file.model.loads import Limits, LoadTable, Operation, Output, Retention, Rotation
-from stickslip.study.file.model.material import DampingTable, MaterialTable, StudyReduction
+from stickslip.study.file.model.material import DampingTable, MaterialTable, StudyReduction, TemperatureTable
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import AnyPart, Copy
 from stickslip.study.file.section import FilePath, Name, Section
@@ -38,6 +38,7 @@ OF_THE_MODEL = frozenset(
     {
         "part",
         "material",
+        "temperature",
         "damping",
         "reduction",
         "contact",
@@ -77,6 +78,9 @@ class Tables(Section):
     title: str = Field("", max_length=200, description="a title of one line")
     part: dict[Name, AnyPart] = Field(min_length=1, description="the tables [part.NAME], one for each part")
     material: MaterialTable | None = Field(None, description="the table [material], of all parts without their own")
+    temperature: TemperatureTable | None = Field(
+        None, description="the table [temperature], of all meshed parts without their own"
+    )
     damping: DampingTable | None = Field(None, description="the table [damping], of all parts without their own")
     reduction: StudyReduction | None = Field(None, description="the table [reduction], of all parts without their own")
     contact: dict[Name, ContactTable] = Field(  # type: ignore[valid-type]

@@ -12,6 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, input_error, nearest_and_known
 from stickslip.model.axis import Axis
 from stickslip.model.damping import dissipates
+from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.hourglass import hourglass_doubts
 from stickslip.model.fe.material import Materials
@@ -32,7 +33,9 @@ from stickslip.model.readers.open_model import read_structure, refuse_other_mode
 from stickslip.model.readers.summary import negative_damping, refuse_indefinite
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
+from stickslip.study.file.model.material import TemperatureTable
 from stickslip.study.file.model.parts import FileModel, SetTable
+from stickslip.study.models.temperature import temperature_of
 from stickslip.study.own_code import called
 from stickslip.units import RPM
 
@@ -137,7 +140,14 @@ COMPANIONS = (".mas", ".dof")  # suffixes of the files that CalculiX writes with
 _KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
 
 
-def file_part(key: str, table: FileModel, home: Path, material: Materials | None, **others: Any) -> Part:
+def file_part(
+    key: str,
+    table: FileModel,
+    home: Path,
+    material: Materials | None,
+    heat: TemperatureTable | None = None,
+    **others: Any,
+) -> Part:
     """Read a part from its files.
 
     Parameters
@@ -150,6 +160,8 @@ def file_part(key: str, table: FileModel, home: Path, material: Materials | None
         Folder to which file names are relative.
     material
         Material of all elements; None: the material of the file.
+    heat
+        Table of its temperature; None: the temperatures of the file.
     **others
         Further fields of `Part`.
 
@@ -160,6 +172,12 @@ def file_part(key: str, table: FileModel, home: Path, material: Materials | None
     """
     path = home / table.file
     name = path.name.lower()
+    if table.temperature is not None and not name.endswith(MESHES) and table.reader is None:
+        raise input_error(
+            f"{key}.temperature",
+            "belongs to a mesh, and the file holds matrices",
+            "Leave it out: the matrices are those of one temperature.",
+        )
     if table.at_speed and name.endswith(MESHES):
         raise input_error(
             f"{key}.at_speed",
@@ -168,11 +186,11 @@ def file_part(key: str, table: FileModel, home: Path, material: Materials | None
         )
     try:
         if table.reader is not None:
-            return _from_own_reader(key, table, home, material, others)
+            return _from_own_reader(key, table, home, material, others, heat)
         if name.endswith(DECKS):
-            return _from_deck(key, table, path, material, others)
+            return _from_deck(key, table, path, material, others, (heat, home))
         if name.endswith(ARCHIVES):
-            return _from_archive(key, table, path, material, others)
+            return _from_archive(key, table, path, material, others, (heat, home))
         return _from_matrices(key, table, home, others)
     except InputError as error:
         raise error.called(_words(key)) from None
@@ -216,7 +234,14 @@ def _units(table: FileModel) -> Units:
     return Units.named(table.units)
 
 
-def _from_deck(key: str, table: FileModel, path: Path, given: Materials | None, others: dict[str, Any]) -> Part:
+def _from_deck(
+    key: str,
+    table: FileModel,
+    path: Path,
+    given: Materials | None,
+    others: dict[str, Any],
+    heat: tuple[TemperatureTable | None, Path],
+) -> Part:
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     if deck.sectors is None and sectors > 1 and table.cyclic == "node_to_node":
@@ -236,6 +261,7 @@ def _from_deck(key: str, table: FileModel, path: Path, given: Materials | None, 
         given or _materials(deck),
         sectors,
         deck.axis,
+        (*heat, deck.temperature),
         held=deck.held if partly.any() else None,
         links=links,
         quadrature=deck.calculix(table.hourglass) if table.quadrature == "calculix" else deck.exact(table.hourglass),
@@ -262,7 +288,14 @@ def _materials(deck: Deck) -> Materials:
     return deck.material
 
 
-def _from_archive(key: str, table: FileModel, path: Path, given: Materials | None, others: dict[str, Any]) -> Part:
+def _from_archive(
+    key: str,
+    table: FileModel,
+    path: Path,
+    given: Materials | None,
+    others: dict[str, Any],
+    heat: tuple[TemperatureTable | None, Path],
+) -> Part:
     mesh = read_ansys_archive(path, units=_units(table), linked=True)
     if given is None:
         numbers = mesh.cell_numbers.tolist()
@@ -282,6 +315,7 @@ def _from_archive(key: str, table: FileModel, path: Path, given: Materials | Non
         given,
         sectors,
         None,
+        (*heat, None),
         quadrature=quadrature,
         links=links,
         warnings=tuple(f"{table.file}: passed over {text}" for text in ansys_passed_over(path)),
@@ -328,6 +362,7 @@ def _solid(
     material: Materials,
     sectors: int,
     axis: Axis | None,
+    heat: tuple[TemperatureTable | None, Path, Temperature | None],
     clamped_sets: tuple[str, ...] = (),
     **others: Any,
 ) -> Part:
@@ -336,10 +371,12 @@ def _solid(
     free = _clamped(key, table, mesh)
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
+    given, home, of_deck = heat
     return solid_part(
         free,
         material,
         axis,
+        temperature=temperature_of(key, given, free, material, axis, home=home, of_deck=of_deck),
         sectors=sectors,
         faces=faces,
         cyclic=_tied(table),
@@ -350,7 +387,12 @@ def _solid(
 
 
 def _from_own_reader(
-    key: str, table: FileModel, home: Path, material: Materials | None, others: dict[str, Any]
+    key: str,
+    table: FileModel,
+    home: Path,
+    material: Materials | None,
+    others: dict[str, Any],
+    heat: TemperatureTable | None,
 ) -> Part:
     """Read a part with the user's function."""
     place = f"{key}.reader"
@@ -360,7 +402,7 @@ def _from_own_reader(
         return _from_matrices(key, table, home, others, found)
     if material is None:
         raise input_error(f"{key}.material", "is missing", "Add the table [material], or one of the part.")
-    return _solid(key, table, found, material, _sectors(key, table), None, **others)
+    return _solid(key, table, found, material, _sectors(key, table), None, (heat, home, None), **others)
 
 
 def _from_matrices(

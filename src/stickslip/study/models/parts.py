@@ -16,11 +16,13 @@ from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
+from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.material import AnyMaterial, Material
 from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_mesh import mesh_sector
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import BodyPoints, Part, Place, Reducing, damper_part, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
@@ -34,6 +36,7 @@ from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
+from stickslip.study.models.temperature import temperature_of
 from stickslip.study.own_code import is_address, made, of_address, state_of
 from stickslip.units import DEG
 
@@ -120,6 +123,10 @@ class Workshop:
             raise input_error(f"part.{name}.material", "is missing", "Add the table [material], or one of the part.")
         return found
 
+    def _temperature(self, name: str, table: Any, mesh: SolidMesh, material: AnyMaterial) -> Temperature | None:
+        given = table.temperature or self.tables.temperature
+        return temperature_of(f"part.{name}", given, mesh, material, Axis(), home=self.home)
+
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
         """Return damping and reduction of a part; `reduced`: whether it is reduced if the study specifies no reduction."""
         reduction = table.reduction or self.tables.reduction or ReductionTable()
@@ -137,14 +144,17 @@ class Workshop:
         points = contact_nodes(self.tables, table)
         LOG.info("meshing the part %s", name)
         mesh = mesh_blade_pair(build(BladePair, table), points)
-        return solid_part(mesh, self._material(name, table), **self.others(table))
+        material = self._material(name, table)
+        heat = self._temperature(name, table, mesh, material)
+        return solid_part(mesh, material, temperature=heat, **self.others(table))
 
     def sector(self, name: str, table: Any) -> Part:
         """Mesh a sector of a bladed disk."""
         LOG.info("meshing the part %s, one of %d sectors", name, table.sectors)
         mesh = mesh_sector(build(BladedSector, table))
         material = self._material(name, table)
-        return solid_part(mesh, material, sectors=table.sectors, **self.others(table))
+        heat = self._temperature(name, table, mesh, material)
+        return solid_part(mesh, material, temperature=heat, sectors=table.sectors, **self.others(table))
 
     def beam(self, name: str, table: Any) -> Part:
         """Make a beam along x."""
@@ -192,7 +202,8 @@ class Workshop:
         """Read a part from its files."""
         LOG.info("reading %s", table.file)
         others = self.others(table)
-        return file_part(f"part.{name}", table, self.home, self.material(table), **others)
+        heat = table.temperature or self.tables.temperature
+        return file_part(f"part.{name}", table, self.home, self.material(table), heat=heat, **others)
 
 
 _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
@@ -276,7 +287,7 @@ def digest(tables: Tables, name: str, home: Path) -> str:
     """Return the hash of everything a part depends on: tables and the content of files."""
     related = _related(tables, name)
     given = {key: tables.part[key].model_dump(mode="json") for key in related}
-    shared = tables.model_dump(mode="json", include={"material", "damping", "reduction"})
+    shared = tables.model_dump(mode="json", include={"material", "temperature", "damping", "reduction"})
     files = [home / file for key in related for file in _files(tables.part[key])]
     content = [digest_of(path) for file in files for path in with_companions(file)]
     kinds = [type(tables.part[key]).__name__ for key in related]

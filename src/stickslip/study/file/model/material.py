@@ -1,10 +1,12 @@
 """The tables [material], [damping] and [reduction], of the whole study or of a part."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import is_dataclass
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, WrapValidator, field_validator, model_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, WrapValidator, create_model, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError
@@ -12,18 +14,22 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import Damping
 from stickslip.model.fe.material import (
     AnyMaterial,
+    ByTemperature,
+    ElasticMaterial,
+    Expansion,
     Material,
     Orientation,
     cast_orientation,
-    elastic_material,
     orthotropic_stiffness,
+    refuse_unstable,
+    row_of,
 )
 from stickslip.model.readers.units import MODULI, SOLIDS
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
 from stickslip.study.file.model.bodies import Direction, Triple
 from stickslip.study.file.quantities import build, refused_by, table_of
-from stickslip.study.file.section import Positive, Section, custom_error, own_object, refuse_all, rising_pair
+from stickslip.study.file.section import FilePath, Positive, Section, custom_error, own_object, refuse_all, rising_pair
 from stickslip.study.own_code import is_address
 from stickslip.units import DEG
 
@@ -124,8 +130,111 @@ class OrientationTable(Section):
         return Orientation(tuple(tuple(row) for row in turn.tolist()), around)
 
 
+class TemperatureTable(Section):
+    """Temperature of meshed parts, at which materials are taken and from which thermal strain follows: uniform, or linear along the radius."""
+
+    uniform_c: float | None = Field(None, ge=-273.15, le=5000, description="one temperature in °C")
+    radius_m: list[Annotated[float, Field(ge=0)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="two distances from the axis of rotation in m, the smaller first; goes with at_radius_c",
+    )
+    at_radius_c: list[Annotated[float, Field(ge=-273.15, le=5000)]] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="temperatures at these two in °C; linear between, constant beyond",
+    )
+    stress_free_c: float | None = Field(
+        None,
+        ge=-273.15,
+        le=5000,
+        description="temperature without thermal strain in °C; left out: 20, or the initial temperatures of the deck",
+    )
+    factor: Annotated[float, Field(ge=0, le=10)] = Field(
+        1.0, description="factor on the difference from the temperature without thermal strain, 0 to 10; may be varied"
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        given = [key for key in ("uniform_c", "at_radius_c", "file") if getattr(self, key, None) is not None]
+        if len(given) > 1:
+            raise custom_error(f"is given together with {given[0]}", "Give the temperature in one way.", given[1])
+        if (self.radius_m is None) != (self.at_radius_c is None):
+            missing = "radius_m" if self.radius_m is None else "at_radius_c"
+            raise custom_error("is missing beside the other", "Give radius_m and at_radius_c.", missing)
+        rising_pair(self.radius_m or [], "radius_m", "radius")
+        if not given and not self.of_files:
+            raise custom_error("gives no temperature", "Give uniform_c, or radius_m and at_radius_c.", "uniform_c")
+        return self
+
+    @property
+    def of_files(self) -> bool:
+        """Whether temperatures may come from files."""
+        return False
+
+
+class FileTemperature(TemperatureTable):
+    """Temperature of a part from a file: as of other parts, by node, or the deck's own times a factor."""
+
+    file: FilePath | None = Field(
+        None,
+        description="temperatures by node: CSV with the columns node, temperature_c, or results of CalculiX (.frd) with NDTEMP, the last of which counts",
+    )
+
+    @property
+    def of_files(self) -> bool:
+        """Whether temperatures may come from files."""
+        return True
+
+
 # keys of an orthotropic material
 ORTHOTROPIC = ("young_moduli_pa", "poisson_ratios", "shear_moduli_pa")
+
+
+CONSTANTS = ("young_modulus_pa", "poisson_ratio", "shear_modulus_pa", *ORTHOTROPIC, "elasticity_pa")
+EXPANSIONS = ("expansion_per_k", "expansions_per_k")
+
+
+def elastic_row(table: Any, given: Collection[str]) -> tuple[float, ...]:
+    """Return the row of `ElasticMaterial.elastic` of the constants of a table, of which the keys `given` are stated."""
+    key = "elasticity_pa"
+    try:
+        if "elasticity_pa" in given:
+            matrix = np.asarray(table.elasticity_pa, dtype=float)
+            refuse_unstable("elasticity_pa", matrix)
+            return row_of(matrix, "23-13-12")
+        if "shear_modulus_pa" in given:
+            key = "shear_modulus_pa"
+            constants = [table.young_modulus_pa] * 3, [table.poisson_ratio] * 3, [table.shear_modulus_pa] * 3
+            return row_of(orthotropic_stiffness(*constants))
+        if ORTHOTROPIC[0] in given:
+            key = ORTHOTROPIC[0]
+            return row_of(orthotropic_stiffness(table.young_moduli_pa, table.poisson_ratios, table.shear_moduli_pa))
+    except InputError as error:
+        raise custom_error(error.problem, error.remedy, key) from None
+    return table.young_modulus_pa, table.poisson_ratio
+
+
+def problems_of_kind(given: Collection[str]) -> Iterator[PydanticCustomError]:
+    """Yield what is wrong with the keys of the constants that are `given`: those of two kinds, or too few."""
+    full = "elasticity_pa" in given
+    nine = [key for key in ORTHOTROPIC if key in given]
+    if full and nine:
+        yield custom_error("is given together with elasticity_pa", "Give the constants or the matrix.", nine[0])
+    for key in ORTHOTROPIC if nine else ():
+        if key not in given:
+            yield custom_error(f"is missing beside {nine[0]}", "An orthotropic material has nine constants.", key)
+    for key in ("young_modulus_pa", "poisson_ratio", "shear_modulus_pa"):
+        if key in given and (full or nine):
+            other = "elasticity_pa" if full else nine[0]
+            yield custom_error(f"is given together with {other}", "Give the constants of one kind of material.", key)
+    for key in ("young_modulus_pa", "poisson_ratio"):
+        if "shear_modulus_pa" in given and key not in given:
+            yield custom_error("is missing beside shear_modulus_pa", "A cubic crystal has three constants.", key)
+    if all(key in given for key in EXPANSIONS):
+        yield custom_error(f"is given together with {EXPANSIONS[0]}", "Give one number or three.", EXPANSIONS[1])
 
 
 class _PlausibleMaterial(Section):
@@ -154,28 +263,51 @@ class _PlausibleMaterial(Section):
 
     def _problems(self) -> Iterator[PydanticCustomError]:
         given = self.model_fields_set
-        full = "elasticity_pa" in given
-        nine = [key for key in ORTHOTROPIC if key in given]
-        if full and nine:
-            yield custom_error("is given together with elasticity_pa", "Give the constants or the matrix.", nine[0])
-        for key in ORTHOTROPIC if nine else ():
-            if key not in given:
-                yield custom_error(f"is missing beside {nine[0]}", "An orthotropic material has nine constants.", key)
-        for key in ("young_modulus_pa", "poisson_ratio", "shear_modulus_pa"):
-            if key in given and (full or nine):
-                other = "elasticity_pa" if full else nine[0]
-                yield custom_error(
-                    f"is given together with {other}", "Give the constants of one kind of material.", key
-                )
-        for key in ("young_modulus_pa", "poisson_ratio"):
-            if "shear_modulus_pa" in given and key not in given:
-                yield custom_error("is missing beside shear_modulus_pa", "A cubic crystal has three constants.", key)
-        if "orientation" in given and not (full or nine or "shear_modulus_pa" in given):
+        yield from problems_of_kind(given)
+        anisotropic = {*ORTHOTROPIC, "shear_modulus_pa", "elasticity_pa"}
+        rows: list[Any] = getattr(self, "over_temperature", None) or []
+        kinds = [frozenset(row.model_fields_set - {"temperature_c"}) for row in rows]
+        if "orientation" in given and not anisotropic & (given | frozenset().union(*kinds)):
             yield custom_error(
                 "belongs to an anisotropic material, and this one is isotropic",
                 "Give shear_modulus_pa (a cubic crystal), nine constants or elasticity_pa, or leave it out.",
                 "orientation",
             )
+        if len(set(kinds)) > 1:
+            yield custom_error("has rows of different keys", "Give all rows the same constants.", "over_temperature")
+        for key in kinds[0] & given if kinds else ():
+            yield custom_error("is given over temperature, too", "Give it once.", key)
+        if kinds and kinds[0] & set(CONSTANTS) and given & set(CONSTANTS):
+            key = sorted(given & set(CONSTANTS))[0]
+            yield custom_error("is given beside constants over temperature", "Give all constants in one place.", key)
+        temperatures = [row.temperature_c for row in rows]
+        if any(b <= a for a, b in pairwise(temperatures)):
+            yield custom_error(
+                f"must have rising temperatures, got {temperatures}",
+                "Give the lowest first.",
+                "over_temperature",
+            )
+        yield from self._problems_of_expansion(rows)
+
+    def _problems_of_expansion(self, rows: list[Any]) -> Iterator[PydanticCustomError]:
+        table: Any = self
+        over = any(key in row.model_fields_set for row in rows for key in EXPANSIONS)
+        if over and table.expansion is None:
+            yield custom_error(
+                "is missing with coefficients over temperature",
+                'Say expansion = "secant" (from expansion_zero_c to the temperature of the row) or "instantaneous" (the slope there).',
+                "expansion",
+            )
+        if over and table.expansion == "secant" and table.expansion_zero_c is None:
+            yield custom_error(
+                "is missing with secant coefficients", "Give the temperature from which they count.", "expansion_zero_c"
+            )
+        if not over and "expansion" in self.model_fields_set:
+            yield custom_error(
+                "belongs to coefficients over temperature", "Leave it out: one coefficient needs none.", "expansion"
+            )
+        if table.expansion != "secant" and "expansion_zero_c" in self.model_fields_set:
+            yield custom_error("belongs to secant coefficients", "Leave it out.", "expansion_zero_c")
 
     def library(self) -> AnyMaterial:
         """Return the material.
@@ -186,23 +318,59 @@ class _PlausibleMaterial(Section):
             If the constants belong to no stable material.
         """
         table: Any = self
-        if not {*ORTHOTROPIC, "shear_modulus_pa", "elasticity_pa"} & self.model_fields_set:
+        given, rows = self.model_fields_set, list[Any](table.over_temperature or [])
+        anisotropic = {*ORTHOTROPIC, "shear_modulus_pa", "elasticity_pa"} & given
+        if not anisotropic and not rows and not set(EXPANSIONS) & given:
             isotropic: Material = build(Material, self)
             return isotropic
-        axes = None if table.orientation is None else table.orientation.library()
-        density, key = table.density_kg_per_m3, "elasticity_pa"
-        try:
-            if table.elasticity_pa is not None:
-                return elastic_material(table.elasticity_pa, density, axes, order="23-13-12")
-            if table.shear_modulus_pa is not None:
-                key = "shear_modulus_pa"
-                constants = [table.young_modulus_pa] * 3, [table.poisson_ratio] * 3, [table.shear_modulus_pa] * 3
-            else:
-                key = ORTHOTROPIC[0]
-                constants = table.young_moduli_pa, table.poisson_ratios, table.shear_moduli_pa
-            return elastic_material(orthotropic_stiffness(*constants), density, axes)
-        except InputError as error:
-            raise custom_error(error.problem, error.remedy, key) from None
+        at = tuple(row.temperature_c for row in rows)
+        over = [row for row in rows if row.model_fields_set & set(CONSTANTS)]
+        elastic = ByTemperature((elastic_row(self, given),))
+        if over:
+            elastic = ByTemperature(tuple(elastic_row(row, row.model_fields_set) for row in over), at)
+        return ElasticMaterial(
+            elastic=elastic,
+            density_table=ByTemperature(((table.density_kg_per_m3,),)),
+            orientation=Orientation() if table.orientation is None else table.orientation.library(),
+            expansion=self._expansion(rows, at),
+        )
+
+    def _expansion(self, rows: list[Any], at: tuple[float, ...]) -> Expansion | None:
+        table: Any = self
+        kind: Literal["secant", "instantaneous"] = table.expansion or "secant"
+        own, over = _coefficients(self), [_coefficients(row) for row in rows]
+        if own is not None:
+            return Expansion(coefficients=ByTemperature((own,)))
+        if not rows or over[0] is None:
+            return None
+        found = tuple(row for row in over if row is not None)
+        return Expansion(coefficients=ByTemperature(found, at), kind=kind, zero=table.expansion_zero_c)
+
+
+def _coefficients(table: Any) -> tuple[float, ...] | None:
+    if table.expansion_per_k is not None:
+        return (table.expansion_per_k,)
+    return None if table.expansions_per_k is None else tuple(table.expansions_per_k)
+
+
+class _Row(Section):
+    """Constants at one temperature."""
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Self:
+        table: Any = self
+        given = self.model_fields_set
+        refuse_all(problems_of_kind(given))
+        if ("young_modulus_pa" in given) != ("poisson_ratio" in given):
+            missing = "poisson_ratio" if "young_modulus_pa" in given else "young_modulus_pa"
+            raise custom_error("is missing beside the other", "Give both at each temperature.", missing)
+        if not given - {"temperature_c"}:
+            raise custom_error(
+                "gives no constant", "Give Young's modulus and Poisson's ratio, or others.", "temperature_c"
+            )
+        if given & set(CONSTANTS):
+            elastic_row(table, given)
+        return self
 
 
 def refuse_implausible(value: float, *, stiff: bool) -> None:
@@ -221,42 +389,82 @@ def refuse_implausible(value: float, *, stiff: bool) -> None:
     )
 
 
-MaterialTable: Any = table_of(
-    Material,
-    base=_PlausibleMaterial,
-    name="MaterialTable",
-    shear_modulus_pa=(
+COLUMNS: dict[str, Any] = {
+    "shear_modulus_pa": (
         Positive | None,
         Field(
             None,
             description="shear modulus in Pa of a cubic (single) crystal: with it young_modulus_pa and poisson_ratio are those along its ⟨001⟩ axes",
         ),
     ),
-    young_moduli_pa=(
+    "young_moduli_pa": (
         Annotated[list[Positive], Field(min_length=3, max_length=3)] | None,
         Field(None, description="of an orthotropic material: Young's moduli [E1, E2, E3] in Pa"),
     ),
-    poisson_ratios=(
+    "poisson_ratios": (
         Three | None,
         Field(
             None,
             description="of an orthotropic material: Poisson's ratios [ν12, ν13, ν23]; ν12 is minus the strain along 2 over that along 1 under tension along 1",
         ),
     ),
-    shear_moduli_pa=(
+    "shear_moduli_pa": (
         Annotated[list[Positive], Field(min_length=3, max_length=3)] | None,
         Field(None, description="of an orthotropic material: shear moduli [G12, G13, G23] in Pa"),
     ),
-    elasticity_pa=(
+    "elasticity_pa": (
         Annotated[list[Six], Field(min_length=6, max_length=6)] | None,
         Field(
             None,
             description="of any material: six rows of the symmetric matrix from strains to stresses in Pa, in the order 11, 22, 33, 23, 13, 12 with doubled shear strains",
         ),
     ),
+    "expansion_per_k": (
+        Annotated[float, Field(ge=-1e-3, le=1e-3)] | None,
+        Field(None, description="coefficient of thermal expansion in 1/K, the same in all directions"),
+    ),
+    "expansions_per_k": (
+        Annotated[list[Annotated[float, Field(ge=-1e-3, le=1e-3)]], Field(min_length=3, max_length=3)] | None,
+        Field(None, description="coefficients of thermal expansion [α1, α2, α3] along the axes of the material in 1/K"),
+    ),
+}
+RowTable: Any = create_model(
+    "RowTable",
+    __base__=_Row,
+    __doc__="Constants of a material at one temperature, of the kinds of [material].",
+    temperature_c=(float, Field(ge=-273.15, le=5000, description="temperature in °C")),
+    young_modulus_pa=(Positive | None, Field(None, description="Young's modulus in Pa")),
+    poisson_ratio=(Annotated[float, Field(ge=0, lt=0.5)] | None, Field(None, description="Poisson's ratio")),
+    **COLUMNS,
+)
+MaterialTable: Any = table_of(
+    Material,
+    base=_PlausibleMaterial,
+    name="MaterialTable",
+    **COLUMNS,
     orientation=(
         OrientationTable | None,
         Field(None, description="the table of the axes of an anisotropic material; left out: the global axes"),
+    ),
+    over_temperature=(
+        list[RowTable] | None,
+        Field(
+            None,
+            min_length=2,
+            max_length=200,
+            description="the tables [[material.over_temperature]]: constants and expansion at rising temperatures; linear between, constant beyond",
+        ),
+    ),
+    expansion=(
+        Literal["secant", "instantaneous"] | None,
+        Field(
+            None,
+            description="what coefficients over temperature are: secant (strain from expansion_zero_c over the difference of temperature) or instantaneous (slope of the strain)",
+        ),
+    ),
+    expansion_zero_c=(
+        float | None,
+        Field(None, ge=-273.15, le=5000, description="temperature in °C from which secant coefficients count"),
     ),
 )
 MaterialTable.__doc__ = "A linear elastic material: isotropic, a cubic crystal, orthotropic, or given by its matrix."

@@ -21,7 +21,13 @@ from stickslip.study.file.model.bodies import (
     Wedge,
     shape,
 )
-from stickslip.study.file.model.material import DampingTable, MaterialTable, ReductionTable
+from stickslip.study.file.model.material import (
+    DampingTable,
+    FileTemperature,
+    MaterialTable,
+    ReductionTable,
+    TemperatureTable,
+)
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error, once, own_object, shown
 
@@ -73,6 +79,9 @@ class PartTable(Section):
 
     material: MaterialTable | None = Field(
         None, description="the table of its material; left out: the table [material]"
+    )
+    temperature: TemperatureTable | None = Field(
+        None, description="the table of its temperature; left out: the table [temperature]"
     )
     damping: DampingTable | None = Field(None, description="the table of its damping; left out: the table [damping]")
     reduction: ReductionTable | None = Field(
@@ -247,6 +256,10 @@ class FileModel(PartTable):
         default_factory=dict,
         description="the tables sets.NAME: further node sets, picked by names, in a box or in a cylinder",
     )
+    temperature: FileTemperature | None = Field(
+        None,
+        description="the table of its temperature; left out: the table [temperature], or else the deck's temperatures",
+    )
     quadrature: Literal["exact", "calculix"] = Field(
         "exact",
         description="integration of a mesh's matrices: exact, or calculix (the rules of that program, for comparisons)",
@@ -298,6 +311,8 @@ class FileModel(PartTable):
     def files(self) -> dict[str, str]:
         """Return the keys that name files, and the file names."""
         named = {key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")}
+        if self.temperature is not None and self.temperature.file is not None:
+            named["temperature.file"] = self.temperature.file
         for i, own in enumerate(self.at_speed):
             named |= {f"at_speed[{i}].{key}": getattr(own, key) for key in ("file", "damping_matrix", "displacement")}
         return {key: name for key, name in named.items() if name is not None}

@@ -1,0 +1,114 @@
+"""Temperatures of the nodes of a part from the tables [temperature] and [part.NAME.temperature]."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.fe.cell_laws import Temperature
+from stickslip.model.fe.material import ElasticMaterial, Materials
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.readers.frd import read_frd
+from stickslip.model.readers.node_table import csv_columns, csv_numbers
+from stickslip.study.file.model.material import FileTemperature, TemperatureTable
+
+STRESS_FREE_C = 20.0
+
+
+def temperature_of(
+    place: str,
+    table: TemperatureTable | None,
+    mesh: SolidMesh,
+    material: Materials,
+    axis: Axis,
+    *,
+    home: Path,
+    of_deck: Temperature | None = None,
+) -> Temperature | None:
+    """Return the temperatures of the nodes of a part; None if no material depends on temperature, or none is given.
+
+    Parameters
+    ----------
+    place
+        Key of the part, for messages.
+    table
+        Its table, or the one of all parts; None: the deck's temperatures.
+    mesh, material, axis
+        Its mesh, materials and axis of rotation.
+    home
+        Folder to which file names are relative.
+    of_deck
+        Temperatures of the part's deck; None without any.
+
+    Raises
+    ------
+    InputError
+        If a material depends on temperature and none is given, or a file lacks nodes.
+    """
+    own = material if isinstance(material, Sequence) else [material]
+    kinds = [one for one in dict.fromkeys(own) if isinstance(one, ElasticMaterial)]
+    if not any(one.varies or one.expansion for one in kinds):
+        return None
+    if table is None:
+        if of_deck is None and any(one.varies for one in kinds):
+            raise input_error(
+                f"{place}.temperature",
+                "is missing, and its material depends on temperature",
+                "Add the table [temperature], or one of the part.",
+            )
+        return of_deck
+    start = np.full(len(mesh.points), STRESS_FREE_C)
+    if table.stress_free_c is not None:
+        start[:] = table.stress_free_c
+    elif of_deck is not None:
+        start = of_deck.start
+    hot = _field(place, table, mesh, axis, home, of_deck)
+    return Temperature(start + table.factor * (hot - start), start)
+
+
+def _field(
+    place: str, table: TemperatureTable, mesh: SolidMesh, axis: Axis, home: Path, of_deck: Temperature | None
+) -> FloatArray:
+    if table.uniform_c is not None:
+        return np.full(len(mesh.points), table.uniform_c)
+    if table.radius_m is not None and table.at_radius_c is not None:
+        radius = np.linalg.norm(axis.arm(mesh.points), axis=1)
+        return np.asarray(np.interp(radius, table.radius_m, table.at_radius_c))
+    if isinstance(table, FileTemperature) and table.file is not None:
+        return _by_node(home / table.file, mesh)
+    if of_deck is None:
+        raise input_error(
+            f"{place}.temperature",
+            "gives no temperature, and the part's file has none",
+            "Give uniform_c, radius_m with at_radius_c, or file.",
+        )
+    return of_deck.values
+
+
+def _by_node(path: Path, mesh: SolidMesh) -> FloatArray:
+    """Read temperatures of the nodes that belong to cells."""
+    numbers: FloatArray
+    values: FloatArray
+    if ".frd" in "".join(path.suffixes[-2:]).lower():
+        fields = [one for one in read_frd(path).fields if one.name == "NDTEMP"]
+        if not fields:
+            raise input_error(str(path), "has no field NDTEMP", "Write temperatures (*NODE FILE, NT).")
+        numbers, values = fields[-1].nodes.astype(float), np.real(fields[-1].values[:, 0])
+    else:
+        columns = csv_columns(path, ("node", "temperature_c"))
+        numbers, values = (csv_numbers(path, name, columns[name]) for name in ("node", "temperature_c"))
+    order = np.argsort(numbers, kind="stable")
+    at = np.minimum(np.searchsorted(numbers, mesh.numbers, sorter=order), len(numbers) - 1)
+    found = np.where(numbers[order[at]] == mesh.numbers, values[order[at]], np.nan)
+    used = np.isin(np.arange(len(mesh.points)), mesh.cells)
+    missing = np.flatnonzero(np.isnan(found) & used)
+    if missing.size:
+        raise input_error(
+            str(path),
+            f"lacks the temperature of {missing.size} nodes, e.g. {mesh.numbers[missing[0]]}",
+            "Give every node of the part.",
+        )
+    return np.asarray(found)
