@@ -5,6 +5,7 @@ import pytest
 import scipy
 
 from stickslip import InputError
+from stickslip.assembly.locations import Places
 from stickslip.assembly.part_copies import copy_of
 from stickslip.model import assemble_deck, natural_frequencies, read_deck
 from stickslip.model.axis import Axis
@@ -284,7 +285,7 @@ def test_a_beam_of_calculix_keeps_a_distance(tmp_path):
         ("*RIGID BODY, NSET=R, REF NODE=1, TIE NSET=R\n", "the parameter TIE NSET is not read"),
         (
             "*COUPLING, REF NODE=1, SURFACE=A\n*DISTRIBUTING\n",
-            r"line 33, \*DISTRIBUTING: \*DISTRIBUTING changes the model",
+            r"line 33, \*DISTRIBUTING: is read in decks of Abaqus for surfaces of nodes alone",
         ),
         (
             "*NSET, NSET=B\n1\n*TRANSFORM, NSET=B\n1., 1., 0., 0., 1., 0.\n",
@@ -380,3 +381,75 @@ def test_nodes_beyond_the_tolerance_are_told(tmp_path):
     text = tied("L100", "H0").replace("*NODE\n101, 0.1,", "*NODE\n101, 0.12,")
     deck = read(tmp_path, text)
     assert deck.ignored[0].startswith("the tie of 1 of 16 nodes of L100, which lie further than 0.00125 from H0 (")
+
+
+def test_a_distributing_coupling_moves_as_the_mean(tmp_path):
+    """Rigid motions of the nodes take the reference node along; any motion gives it the mean momentum and moment of momentum."""
+    text = (
+        "*PREPRINT, ECHO=NO\n"
+        + bricks()
+        + STEEL
+        + ROOT
+        + "*NODE\n50, 0.5, 0.1, -0.02\n*NSET, NSET=END\n13, 14, 15, 10\n"
+    )
+    text += "*ELEMENT, TYPE=MASS, ELSET=M\n90, 50\n*MASS, ELSET=M\n2.5\n*SURFACE, NAME=S1, TYPE=NODE\nEND\n"
+    deck = read(tmp_path, text + "*COUPLING, CONSTRAINT NAME=C, REF NODE=50, SURFACE=S1\n*DISTRIBUTING\n")
+    solid = rotating_solid(deck.mesh, deck.material, quadrature=deck.quadrature, links=deck.links)
+    moved = solid.at_nodes(np.random.default_rng(5).normal(size=solid.structure.n))
+    row = {int(n): i for i, n in enumerate(deck.mesh.numbers)}
+    nodes = [row[n] for n in (13, 14, 15, 10)]
+    arms = deck.mesh.points[nodes] - deck.mesh.points[nodes].mean(axis=0)
+    inertia = sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in arms)
+    spin = np.linalg.solve(inertia, np.cross(arms, moved[nodes]).sum(axis=0))
+    away = deck.mesh.points[row[50]] - deck.mesh.points[nodes].mean(axis=0)
+    np.testing.assert_allclose(moved[row[50]], moved[nodes].mean(axis=0) + np.cross(spin, away), rtol=1e-9)
+    # the mass lies on the bar through that operator
+    free = assemble_deck(read(tmp_path, bricks() + STEEL + ROOT))
+    operator = np.zeros((3, free.n))
+    table = {(int(n), c): i for i, (n, c) in enumerate(zip(free.dofs.node, free.dofs.component, strict=True))}
+    for node, arm in zip((13, 14, 15, 10), arms, strict=True):
+        for k in range(3):
+            unit = np.eye(3)[k]
+            operator[:, table[node, "xyz"[k]]] = unit / 4 + np.cross(
+                np.linalg.solve(inertia, np.cross(arm, unit)), away
+            )
+    mass = free.mass.toarray() + 2.5 * operator.T @ operator
+    expected = np.sqrt(scipy.linalg.eigh(free.stiffness.toarray(), mass, eigvals_only=True)) / (2 * np.pi)
+    np.testing.assert_allclose(every_frequency(assemble_deck(deck)), expected, rtol=1e-9)
+
+
+def test_a_support_along_a_global_axis_of_turned_axes_is_plain(tmp_path):
+    text = (
+        bricks()
+        + STEEL
+        + ROOT
+        + "*NSET, NSET=A\n14\n*TRANSFORM, NSET=A, TYPE=C\n0., 0., 0., 0., 0., 1.\n*BOUNDARY\n14, 3\n"
+    )
+    deck = read(tmp_path, text)
+    assert deck.links is None
+    assert deck.held[13].tolist() == [False, False, True]
+
+
+def test_places_on_nodes_that_follow_are_refused_by_name(tmp_path):
+    deck = read(
+        tmp_path, TWO + "*NSET, NSET=SEAM\n13, 14, 15, 16\n*NSET, NSET=TIP\n17, 18, 19, 20\n" + equations(JOINED)
+    )
+    part = solid_part(deck.mesh, deck.material, quadrature=deck.quadrature, links=deck.links)
+    places = Places({"bar": part})
+    assert set(part.structure.dofs.node) == set(range(5, 9)) | set(range(13, 21))
+    assert places.spot("bar.SEAM", "load.a.on").surface is not None
+    for name in ("bar.node9", "bar.node9.x"):
+        with pytest.raises(InputError, match=f"load.a.on: some directions of '{name}' follow others by equations"):
+            places.spot(name, "load.a.on")
+    other = solid_part(
+        deck.mesh, deck.material, links=type(deck.links)(**{**vars(deck.links), "lasting": np.arange(8, 12)})
+    )
+    with pytest.raises(InputError, match=r"contact.a: 4 nodes of 'bar.SEAM', e.g. node 13, follow others by equations"):
+        Places({"bar": other}).spot("bar.SEAM", "contact.a")
+
+
+def test_hourglass_control_of_the_deck_is_told(tmp_path):
+    text = bricks().replace("C3D8", "C3D8R") + STEEL + ROOT + "*SECTION CONTROLS, NAME=EC, HOURGLASS=ENHANCED\n"
+    assert read(tmp_path, text).ignored == (
+        "*SECTION CONTROLS (deck.inp: line 32): give the factor of hourglass control of C3D8R in the study",
+    )

@@ -204,20 +204,30 @@ class Places:
         return np.where(rows >= 0, rows + self.offset(head), -1)
 
 
-def _refuse_followers(part: Part, found: Spot, place: str) -> None:
-    """Refuse nodes that follow others by equations of the part's file: they are no coordinates."""
+def _followers(part: Part) -> IntArray:
+    """Return the numbers of the nodes that follow others by equations of the part's file."""
     solid = part.solid
-    if solid is None or solid.followers is None or found.surface is None or found.surface.numbers is None:
+    if solid is None or solid.followers is None:
+        return NONE
+    follows = (np.diff(solid.followers.indptr) > 0) & ~np.isin(np.arange(solid.mesh.points.size), solid.moving)
+    return np.asarray(solid.mesh.numbers[follows.reshape(-1, 3).any(axis=1)])
+
+
+def _refuse_followers(part: Part, found: Spot, place: str) -> None:
+    """Refuse a surface with nodes that follow others: they are no coordinates."""
+    if found.surface is None or found.surface.numbers is None:
         return
-    moves = (np.diff(solid.followers.indptr) > 0) & ~np.isin(np.arange(solid.mesh.points.size), solid.moving)
-    after = solid.mesh.numbers[moves.reshape(-1, 3).any(axis=1)]
-    own = np.intersect1d(found.surface.numbers, after)
+    own = np.intersect1d(found.surface.numbers, _followers(part))
     if own.size:
-        raise input_error(
-            place,
-            f"{own.size} nodes of {found.name!r} follow others by equations of the part's file, e.g. node {own[0]}",
-            "Take them out of the set, or name the nodes that they follow: an equation lets the node in the fewest node sets follow.",
-        )
+        raise _following(place, f"{own.size} nodes of {found.name!r}, e.g. node {own[0]},")
+
+
+def _following(place: str, what: str) -> InputError:
+    return input_error(
+        place,
+        f"{what} follow others by equations of the part's file",
+        "Take them out, or name the nodes that they follow: an equation lets the node in the fewest node sets follow.",
+    )
 
 
 def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
@@ -226,6 +236,9 @@ def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
         return input_error(
             place, f"every node of {name!r} is clamped", "Name a set whose nodes can move, or clamp less."
         )
+    node = _NODE.match(name.partition(".")[2])
+    if node is not None and int(node[1]) in _followers(part):
+        return _following(place, f"some directions of {name!r}")
     table, n = part.structure.dofs, part.structure.n
     numbered = [is_numbered(component) for component in table.component]
     known = [f"{head}.{word}" for word in part.names]

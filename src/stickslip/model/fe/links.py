@@ -169,8 +169,9 @@ class _Followers:
         if not free:
             raise input_error(
                 place,
-                "ties nodes of the cyclic faces to each other or holds them, which the symmetry does already or contradicts",
-                "Let the equation have a node beside the faces, or take it out.",
+                "ties nodes of the cyclic faces to each other or holds them in a turned direction, which the symmetry does already or which "
+                "is not read",
+                "Let an equation have a node beside the faces, or take it out; hold nodes there in all directions, or along x, y or z.",
             )
         strong = [dof for dof in free if free[dof] >= PIVOT * max(free.values())]
         self.solve(left, min(strong, key=lambda dof: self._rank[dof]))

@@ -198,6 +198,12 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     for kind in dict.fromkeys(model.kinds):
         if kind not in (*QUADRATURES, "C3D5"):
             model.ignored.append(f"what makes {kind} another element than its plain kind")
+    if "C3D8R" in model.kinds:
+        model.ignored += [
+            f"*{b.keyword} ({b.path.name}: line {b.line}): give the factor of hourglass control of C3D8R in the study"
+            for b in blocks
+            if b.keyword in ("SECTION CONTROLS", "HOURGLASS STIFFNESS")
+        ]
     square = model.speed_squares[-1] if model.speed_squares else None
     used = np.isin(np.arange(len(mesh.points)), mesh.cells)
     depends = any(isinstance(m, ElasticMaterial) and (m.varies or m.expansion) for m in materials.values())

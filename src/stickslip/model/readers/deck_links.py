@@ -8,7 +8,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.fe.links import Links
+from stickslip.model.fe.links import ROUNDING, Links
 from stickslip.model.readers.keywords import Block, real_number, whole_number
 from stickslip.model.readers.node_table import NodeTable
 from stickslip.model.readers.units import Units
@@ -80,7 +80,7 @@ class DeckLinks:
         if direction > 3 or node not in self.turns:
             return [(node, direction, factor)]
         axis = self.turns[node][direction - 1]
-        return [(node, i + 1, factor * float(v)) for i, v in enumerate(axis) if v != 0.0]
+        return [(node, i + 1, factor * float(v)) for i, v in enumerate(axis) if abs(v) > ROUNDING]
 
     def linear(self, place: str, what: str) -> None:
         """Note a link that is right for small rotations only."""
@@ -203,11 +203,54 @@ def read_coupling(
     for place, fields in block.rows():
         first = whole_number(fields[0], place, "direction")
         last = whole_number(fields[1], place, "direction") if len(fields) > 1 and fields[1] else first
-        directions |= set(range(first, last + 1))
+        directions |= set(range(max(first, 1), min(last, 6) + 1))
     own = tuple(sorted((directions or {1, 2, 3}) & {1, 2, 3}))
     if not own:
         raise input_error(block.place, "names no direction from 1 to 3", "Nodes of solids have these alone.")
     _follow(links, coupling.place, surface[surface != reference], reference, table, own)
+
+
+def read_distributing(
+    links: DeckLinks, coupling: Block, block: Block, nodes: Nodes, table: NodeTable, surface: IntArray
+) -> None:
+    """Read ``*DISTRIBUTING``: a reference node moves as the nodes of a surface do in the mean, all with the same weight.
+
+    With the places r_i about their centre, the rotation is that of the rigid body of equal masses with the same angular momentum:
+    ``sum(r_i^2 I - r_i r_i^T) theta = sum(r_i x u_i)``.
+    """
+    reference = _reference(coupling, nodes)
+    for place, fields in block.rows():
+        if [text for text in fields if text] not in ([], ["1", "6"]):
+            raise input_error(place, f"couples the directions {', '.join(fields)}", "All six are read: leave them out.")
+    own = surface[surface != reference]
+    points = table.points[table.index(own)]
+    centre = points.mean(axis=0)
+    arms = points - centre
+    inertia = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    if np.linalg.eigvalsh(inertia)[0] <= ON_LINE**2 * np.trace(inertia):
+        raise input_error(coupling.place, "couples nodes on one line, which have no rotation", "Name nodes off a line.")
+    away = table.points[table.index(np.array([reference]))][0] - centre
+    links.linear(coupling.place, "a distributing coupling")
+    links.references.add(reference)
+    cross = _crossed(away)
+    for i in range(3):
+        mean = [(int(node), i + 1, -1.0 / own.size) for node in own]
+        turned = [(reference, 4 + k, float(cross[i, k])) for k in range(3) if cross[i, k]]
+        links.equations.append((coupling.place, [(reference, i + 1, 1.0), *mean, *turned]))
+        moments = [
+            (int(node), k + 1, float(_crossed(arm)[i, k]))
+            for node, arm in zip(own, arms, strict=True)
+            for k in range(3)
+            if _crossed(arm)[i, k]
+        ]
+        spin = [(reference, 4 + k, -float(inertia[i, k])) for k in range(3) if inertia[i, k]]
+        links.equations.append((coupling.place, [*spin, *moments]))
+
+
+def _crossed(arm: FloatArray) -> FloatArray:
+    """Return the (3, 3) matrix of ``arm x``."""
+    x, y, z = arm
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _reference(block: Block, nodes: Nodes) -> int:

@@ -327,7 +327,12 @@ def _hold(model: DeckModel, nodes: IntArray, first: int, last: int, place: str) 
     for direction in range(first, min(last, 6) + 1):
         if direction <= 3:
             model.fixed["xyz"[direction - 1]].append(plain)
-            links.supports += [(f"{place}, {SUPPORT}", links.along(node, direction)) for node in turned]
+            for node in turned:
+                terms = links.along(node, direction)
+                if len(terms) == 1:  # along a global axis
+                    model.fixed["xyz"[terms[0][1] - 1]].append(np.array([node]))
+                else:
+                    links.supports.append((f"{place}, {SUPPORT}", terms))
         else:
             links.held_angles |= {(int(node), direction) for node in nodes}
 

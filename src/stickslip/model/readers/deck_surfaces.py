@@ -11,7 +11,7 @@ from stickslip.errors import input_error
 from stickslip.model.mesh.facets import centres, interpolation, positions
 from stickslip.model.mesh.nearest_facets import closest, near_pairs
 from stickslip.model.mesh.solid_mesh import CORNERS, EDGES, by_kind
-from stickslip.model.readers.deck_links import read_coupling
+from stickslip.model.readers.deck_links import read_coupling, read_distributing
 from stickslip.model.readers.deck_model import DeckModel, nodes_named, passed_over, unknown, unread
 from stickslip.model.readers.keywords import Block, real_number, unique_in_order, whole_number
 
@@ -80,10 +80,23 @@ def couple(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> No
     for block, below in pairwise([*blocks, Block("END", {}, blocks[-1].path, 0)]):
         if block.keyword != "COUPLING" or "COUPLING" in passed:
             continue
-        if below.keyword != "KINEMATIC":
-            raise unread(block, "a *COUPLING without *KINEMATIC in the next line ties nodes and is not read")
-        surface = _surface_nodes(model, surfaces, block.parameter("SURFACE").upper(), block.place)
-        read_coupling(model.links, block, below, partial(nodes_named, model), model.nodes, surface)
+        name = block.parameter("SURFACE").upper()
+        read = read_coupling
+        if below.keyword == "DISTRIBUTING":
+            kind = surfaces[name].parameters.get("TYPE", "ELEMENT").upper() if name in surfaces else "NODE"
+            if not model.of_abaqus or kind != "NODE":
+                raise unread(
+                    below,
+                    "is read in decks of Abaqus for surfaces of nodes alone: CalculiX leaves it out of vibrations, and weights of "
+                    "faces are not known",
+                )
+            read = read_distributing
+        elif below.keyword != "KINEMATIC":
+            raise unread(
+                block, "a *COUPLING without *KINEMATIC or *DISTRIBUTING in the next line ties nodes and is not read"
+            )
+        surface = _surface_nodes(model, surfaces, name, block.place)
+        read(model.links, block, below, partial(nodes_named, model), model.nodes, surface)
 
 
 def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:

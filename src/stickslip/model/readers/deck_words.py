@@ -36,6 +36,7 @@ PARAMETERS: dict[str, frozenset[str]] = {
         ("RIGID BODY", ["NSET", "PIN NSET", "ELSET", "REF NODE", "REFNODE", "ROT NODE", "ROTNODE"], ["POSITION"]),
         ("COUPLING", ["REF NODE", "REFNODE", "SURFACE"], ["CONSTRAINT NAME"]),
         ("KINEMATIC", [], []),
+        ("DISTRIBUTING", [], []),
         ("MASS", ["ELSET"], []),
         ("SPRING", ["ELSET"], ["RTOL"]),
         ("DASHPOT", ["ELSET"], ["RTOL"]),
@@ -170,7 +171,6 @@ DAMPING = frozenset({"DAMPING", "MODAL DAMPING", "GLOBAL DAMPING", "DAMPING CONT
 # Keywords that are known to change the matrices
 REFUSED = frozenset(
     {
-        "DISTRIBUTING",
         "DISTRIBUTING COUPLING",
         "CONTACT",
         "SHELL SECTION",
