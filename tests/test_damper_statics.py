@@ -71,7 +71,7 @@ def test_equal_friction_on_both_lines_of_a_cylinder_leaves_the_wider_one_stuck()
     # between T = mu N of the other line and the smaller normal forces beside it
     assert 0.0 < min(at_60.most) < 0.2
     assert slip_sentence(at_60).startswith("left cannot slip to and fro, T/N reaches only 0.")
-    assert slip_sentence(at_30) == "right can slip to and fro, T/N reaches its friction coefficient 0.2"
+    assert slip_sentence(at_30) == "right can slip to and fro, T/N reaches the friction coefficient 0.2"
     # its own angle lies in the ranges in which it cannot slip, and that of the other does not
     assert any(low <= 30.0 <= high for low, high in at_60.held_deg)
     assert not any(low <= 60.0 <= high for low, high in at_30.held_deg)

@@ -328,7 +328,7 @@ def test_what_is_not_there_is_told_as_nothing(slipping: Any) -> None:
     check(slipping, unstable_peak_amplitude=np.nan, unstable_peak_frequency_hz=np.nan, peak_slip_facets=np.nan)
     check(slipping, retention_frequency_shift_hz=np.nan)
     assert [v["why"].partition(" the mode")[0] for v in json.loads(slipping["physics_verdicts"].item())] == [
-        "friction alone can damp"
+        "friction damps"
     ]
     assert "surface_point" not in slipping
     assert "surface_triangle" not in slipping

@@ -233,7 +233,7 @@ def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> 
     assert any(re.match(r"natural frequencies, contacts stuck: .* Hz (in the range|above)", x) for x in said.beside)
     assert said.at_rest[0].startswith("static equilibrium: 9 of 9 contact points are pressed")
     assert said.at_rest[1].startswith("contact flat: 6 of 6 closed, ")
-    assert "damper: flat can slip to and fro, T/N reaches its friction coefficient 0.6" in said.at_rest
+    assert "damper: flat can slip to and fro, T/N reaches the friction coefficient 0.6" in said.at_rest
     assert said.doubts == ()
     beside = check(changed(base, {}, "beside", frequency_hz=[20.0, 30.0]))
     assert any("no natural frequency lies between 20.00 and 30.00 Hz" in x for x in beside.doubts)

@@ -130,7 +130,7 @@ def test_the_run_says_where_friction_works(brake: ss.Result, tmp_path: Path) -> 
     (only,) = own.of("works")
     assert works.startswith(f"Friction works at force {only.value:g} N: the peak per unit")
     assert gone.startswith(f"Out of the working range above force {only.value:g} N: ")
-    assert "no contact sticks throughout the cycle" in gone
+    assert "No contact sticks throughout the cycle" in gone
     flags = data["friction_regime"]
     assert [REGIMES[k] for k in flags.values] == list(own.regimes)
     assert str(flags.attrs["flag_meanings"]).split()[3] == "lets_go"

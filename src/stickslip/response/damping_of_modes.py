@@ -286,10 +286,15 @@ class DampedMode:
         low, high = sorted((self.stuck, self.ends))
         return max(low - omega, omega - high, 0.0)
 
-    def __str__(self) -> str:
+    @property
+    def sentences(self) -> tuple[str, str]:
+        """What friction does to the mode, and where it is without sticking."""
         stuck, best, ends = (omega / HZ for omega in (self.stuck, self.best, self.ends))
-        damping = f"up to {100 * self.ratio:.2g} % of critical at {best:.2f} Hz"
-        return f"the mode at {stuck:.2f} Hz (sticking) by {damping}, on its way to {ends:.2f} Hz (sliding)"
+        damping = f"up to {100 * self.ratio:.2g} % of critical, at {best:.2f} Hz"
+        return (
+            f"friction damps the mode at {stuck:.2f} Hz by {damping}",
+            f"sliding freely, this mode is at {ends:.2f} Hz",
+        )
 
 
 def damped_modes(

@@ -14,7 +14,14 @@ from stickslip.analyses.forced_response.physics.known import (
     nothing_pressed,
     off_engine_order,
 )
-from stickslip.analyses.forced_response.physics.limits import NAMED_MODES, Physics, beforehand, driven_line, physics_of
+from stickslip.analyses.forced_response.physics.limits import (
+    ESTIMATE,
+    NAMED_MODES,
+    Physics,
+    beforehand,
+    driven_line,
+    physics_of,
+)
 from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
 from stickslip.analyses.forced_response.problem import STILL_HZ, Question, question_of
 from stickslip.analyses.forced_response.shooting import shooting_lines
@@ -229,11 +236,9 @@ def _of_friction(physics: Physics | None) -> Iterator[str]:
     """Yield the estimate of the damping by friction, mode by mode."""
     damped = [] if physics is None else physics.damped[:NAMED_MODES]
     for mode in damped:
-        stuck, best, ends = (omega / HZ for omega in (mode.stuck, mode.best, mode.ends))
-        yield f"friction damps the mode at {stuck:.2f} Hz by up to {100 * mode.ratio:.2g} % of critical, at {best:.2f} Hz"
-        yield f"sliding freely, this mode is at {ends:.2f} Hz"
+        yield from mode.sentences
     if damped:
-        yield "this estimate holds within a factor of 1.5, for steady normal forces, at the one best amplitude"
+        yield ESTIMATE
 
 
 def _notes(question: Question) -> Iterator[str]:

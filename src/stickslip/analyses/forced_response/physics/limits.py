@@ -35,6 +35,7 @@ BESIDE = 0.01  # largest relative distance of a resonance from the frequency of 
 # half the range of a normal force over its mean, above which the estimate of friction damping does not hold
 STEADY = 0.5
 NAMED_MODES = 3  # modes that a sentence lists
+ESTIMATE = "this estimate holds within a factor of 1.5, for steady normal forces, at the one best amplitude"
 GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
 
 
@@ -231,15 +232,15 @@ def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> 
     if not physics.damped:
         return
     if moving:
-        why = f"what friction can do was not estimated: {moving}"
-        yield Verdict("trusted", why=why, remedy="stickslip check has the estimate for steady ones.")
+        why = f"the damping by friction was not estimated: {moving}"
+        yield Verdict("trusted", why=why, remedy="stickslip check estimates it for steady normal forces.")
         return
     shown = physics.damped[:NAMED_MODES]
     if np.isfinite(peak_hz):
         shown = (min(physics.damped, key=lambda d: d.apart(peak_hz * HZ)),)
-    told = "; ".join(str(d) for d in shown)
-    why = f"friction alone can damp {told}: an estimate within a factor of 1.5, for steady normal loads and one slip ratio of all contacts"
-    yield Verdict("trusted", why=why, remedy="That is at one amplitude: smaller and larger motions are damped less.")
+    first, *others = (text for d in shown for text in d.sentences)
+    why = ". ".join([first, *(f"{text[:1].upper()}{text[1:]}" for text in others)])
+    yield Verdict("trusted", why=why, remedy=f"{ESTIMATE[:1].upper()}{ESTIMATE[1:]}.")
 
 
 def _loads_move(question: Question, response: Response) -> str:
@@ -258,7 +259,7 @@ def _loads_move(question: Question, response: Response) -> str:
     swing = 0.5 * (pressed.max(axis=1) - pressed.min(axis=1)) / pressed.mean(axis=1)
     opened = np.any(pressed <= 0.0, axis=1)
     if opened.any():
-        return f"{opened.sum()} of {len(pressed)} contact points that are pressed on average open at the peak"
+        return f"{opened.sum()} of {len(pressed)} pressed contact points open at the peak"
     most = float(np.average(swing, weights=pressed.mean(axis=1)))
     return f"normal forces at the peak swing by {100 * most:.0f} % of their mean" if most > STEADY else ""
 

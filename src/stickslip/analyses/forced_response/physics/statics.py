@@ -1,6 +1,6 @@
 """Statics of the dampers of a model in words: which flanks can slip, and at which platform angles they cannot."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -32,17 +32,30 @@ def damper_lines(every: Sequence[DamperStatics]) -> Iterator[str]:
 def of_statics(model: Assembled) -> Iterator[Verdict]:
     """Yield a note on the flanks of each damper: which can slip, and at which platform angles they cannot."""
     for one in statics_of_dampers(model):
-        why = "; ".join(slip_sentence(limits) for limits in one.flanks)
-        angles = [angle_sentence(limits) for limits in one.flanks]
-        remedy = " ".join(f"{text[:1].upper()}{text[1:]}." for text in angles if text)
+        why = "; ".join(_alike(one.flanks, slip_sentence))
+        angles = _alike(one.flanks, angle_sentence)
+        remedy = " ".join(f"{text[:1].upper()}{text[1:]}." for text in angles)
         yield Verdict("trusted", why=f"{one.name} in static equilibrium: {why}", remedy=remedy)
+
+
+def _alike(flanks: Sequence[FlankLimits], told: Callable[[FlankLimits], str]) -> list[str]:
+    """Return the sentences about flanks; flanks of which the same is said share one."""
+    names: dict[str, list[str]] = {}
+    for limits in flanks:
+        if text := told(limits):
+            names.setdefault(text.removeprefix(limits.flank.name), []).append(limits.flank.name)
+    found = []
+    for text, own in names.items():
+        several = text if len(own) == 1 else text.replace(" is ", " are ", 1).replace("; it ", "; they ")
+        found.append(f"{' and '.join(own)}{several}")
+    return found
 
 
 def slip_sentence(limits: FlankLimits) -> str:
     """Return whether a flank can slip, with the largest T/N in equilibrium."""
     flank, least = limits.flank, min(limits.most)
     if limits.slips:
-        return f"{flank.name} can slip to and fro, T/N reaches its friction coefficient {flank.friction:.2g}"
+        return f"{flank.name} can slip to and fro, T/N reaches the friction coefficient {flank.friction:.2g}"
     return f"{flank.name} cannot slip to and fro, T/N reaches only {least:.2g} of {flank.friction:.2g}"
 
 
@@ -52,7 +65,7 @@ def angle_sentence(limits: FlankLimits) -> str:
         return ""
     own = f"{limits.flank.name} is inclined by {limits.angle_deg:.0f} degrees (0 is square to the pull)"
     ranges = [_range(low, high) for low, high in limits.held_deg]
-    return f"{own}; it cannot slip {' and '.join(ranges)}" if ranges else f"{own}; no angle keeps it from slipping"
+    return f"{own}; it cannot slip {' and '.join(ranges)}" if ranges else f"{own}; it slips at any angle"
 
 
 def _range(low: float, high: float) -> str:

@@ -118,8 +118,8 @@ def _examined(case: Curve) -> str:
     ):
         said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
     said += ["attained in time integration"] * bool(case.attained[peak])
-    said += told_of_model(case)
-    return ", ".join(said)
+    changes = told_of_model(case)
+    return ", ".join(said) + f". It changes {', '.join(changes)}" * bool(changes)
 
 
 def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:

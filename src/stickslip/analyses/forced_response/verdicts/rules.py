@@ -238,7 +238,7 @@ def contact_stiffness(case: Curve) -> Iterator[Finding]:
     if abs(SOFTER * case.read(StiffnessChange).stiffness_peak_slope) > DECIDED:
         yield Finding(
             "trusted",
-            f"the contact stiffness decides the peak: {_softer(case)}",
+            f"the contact stiffness decides the peak: it changes {_softer(case)}",
             "Know it to a few per cent, from a measured stuck frequency for example, or vary it ([vary]).",
         )
 
@@ -252,7 +252,7 @@ def _softer(case: Curve) -> str:
     percent = -100 * SOFTER * slope
     size = f"{percent:+.2g} %" if abs(percent) >= LEAST_PERCENT else f"less than {LEAST_PERCENT:g} %"
     moved = f" and {-SOFTER * hertz:+.2g} Hz" if abs(hertz) >= LEAST_HZ else ""
-    return f"contacts {100 * SOFTER:g} % softer change it by {size}{moved}"
+    return f"by {size}{moved} with contacts {100 * SOFTER:g} % softer"
 
 
 def told_of_model(case: Curve) -> list[str]:
@@ -263,7 +263,7 @@ def told_of_model(case: Curve) -> list[str]:
         (own.points_peak_change, own.points_frequency_change_hz, "half the contact points"),
     ):
         if np.isfinite(change):
-            told.append(f"{what} change it by {100 * change:+.2g} % and {hertz:+.2g} Hz")
+            told.append(f"by {100 * change:+.2g} % and {hertz:+.2g} Hz with {what}")
     return told + [said for said in (_softer(case),) if said]
 
 

@@ -326,7 +326,7 @@ def range_line(own: WorkingRange) -> str:
         return f"cannot be told from these values of {own.naming.word}"
     works = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
     by = "within 3 dB of the smallest peak" if own.stuck is None else "3 dB below the stuck system's peak"
-    told = [f"friction works {works} ({by})" if works else f"friction works at no {own.naming.word}"]
+    told = [f"friction works {works} ({by})" if works else "friction works nowhere"]
     told.append(f"the {_size(own)} is smallest at {_value(own, own.smallest)}")
     if own.stuck is not None:
         told.append(f"all contacts stick {'from' if own.falling else 'up to'} {_value(own, own.stuck)}")
@@ -424,8 +424,8 @@ def _gone(own: WorkingRange, gone: Sequence[CurvePeak]) -> str:
         risen += f" ({_percent(worst.size / own.stuck.size)} of the stuck system's)"
     risen += f", at {worst.hertz:.5g} Hz"
     if not any(p.contacts.holding for p in gone):
-        return f"{risen}, and no contact sticks throughout the cycle"
-    return f"{risen}, and contacts stick {_percent(worst.contacts.sticking)} of the cycle"
+        return f"{risen}. No contact sticks throughout the cycle"
+    return f"{risen}. Contacts stick {_percent(worst.contacts.sticking)} of the cycle"
 
 
 def _saturated(best: CurvePeak, last: CurvePeak) -> str:
@@ -437,7 +437,7 @@ def _saturated(best: CurvePeak, last: CurvePeak) -> str:
     if grown <= 1.0:
         return ""
     becomes = f"grows {more:.3g} times" if more >= 1.0 else f"falls to {_percent(more)}"
-    return f"; while the amplitude grows {grown:.3g} times, the energy lost in a cycle over the amplitude {becomes}"
+    return f". While the amplitude grows {grown:.3g} times, the energy lost in a cycle over the amplitude {becomes}"
 
 
 def _percent(share: float) -> str:
