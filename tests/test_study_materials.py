@@ -7,6 +7,7 @@ from solid_models import box
 from test_anisotropic import CUBE, E_CUBE, G_CUBE, NU_CUBE, ORTHO
 from typer.testing import CliRunner
 
+from stickslip.assembly.assembling import assemble
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.model.deck import write_deck
@@ -236,3 +237,47 @@ def test_the_factor_of_a_temperature_is_varied(folder):
 def test_temperatures_that_do_not_fit_are_refused(folder, material, temperature, message):
     with pytest.raises(InputError, match=message):
         part_of(folder, STEEL + material, temperature)
+
+
+CONTACT = """
+[contact.wall]
+between = ["blade.tip", "ground"]
+law = "elastic_coulomb"
+per = "area"
+friction_coefficient = 0.5
+tangential_stiffness_n_per_m3 = 1e12
+axial_stiffness_n_per_m3 = 1e12
+normal_stiffness_n_per_m3 = 2e10
+{gap}
+[load.shaker]
+on = "blade.tip"
+direction = [0, 0, 1]
+force_n = 1.0
+[output]
+points.tip = "blade.tip"
+[forced_response]
+frequency_hz = [1000.0, 1200.0]
+"""
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-7])
+def test_heat_presses_a_bar_against_a_wall(folder, gap):
+    """A bar that grows by αΔTL against springs k: force k (αΔTL − gap) / (1 + kL/EA), all along x."""
+    bar = (
+        "young_moduli_pa = [2e11, 2e11, 2e11]\npoisson_ratios = [0.0, 0.0, 0.0]\nshear_moduli_pa = [1e11, 1e11, 1e11]\n"
+    )
+    bar += "expansions_per_k = [1.2e-5, 0.0, 0.0]\n"
+    more = "[part.blade.temperature]\nuniform_c = 22.0\n" + CONTACT.format(gap=f"gap_m = {gap}" if gap else "")
+    found = assemble(read_study(study(folder, bar, more)).model(), 3)
+    length, area = 0.06, 0.02 * 0.01
+    k = 2e10 * area  # soft, so that the end stays plane
+    expected = k * (1.2e-5 * 2.0 * length - gap) / (1 + k * length / (2e11 * area))
+    assert -found.static_force[:, 2].sum() == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_heated_part_is_checked_and_has_its_mass(folder):
+    more = "[part.blade.temperature]\nuniform_c = 520.0\n[modes]\nnumber = 1\n"
+    path = study(folder, STEEL + ROWS, more)
+    done = CliRunner().invoke(app, ["check", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "mass 0.0942 kg" in done.output

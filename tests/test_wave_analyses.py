@@ -249,7 +249,7 @@ def test_static_displacement_is_told_and_doubted_where_it_is_large(joined: Joine
     )
     first, second = outcome.summaries["modes"]
     assert first.title == "Natural frequencies in Hz at 60000 rpm"
-    assert second.title == "Static displacement under the centrifugal load"
+    assert second.title == "Static displacement under the centrifugal load and thermal strain"
     large = float(outcome.tree["modes"].static_displacement_m[0])
     assert large == pytest.approx(100 * small, rel=1e-9)
     assert f"{1e3 * large:.4g}" in second.rows[0]

@@ -36,10 +36,12 @@ class ModelFacts:
     elements: int | None = column("1", "number of elements; 0 for matrices", default=None)
     static_rpm: float | None = column("rpm", "speed of the static displacement", default=None)
     static_displacement_m: float | None = column(
-        "m", "largest static displacement under the centrifugal load", default=None
+        "m", "largest static displacement under the centrifugal load and thermal strain", default=None
     )
-    static_strain: float | None = column("1", "largest principal strain under the centrifugal load", default=None)
-    static_rotation_rad: float | None = column("rad", "largest rotation under the centrifugal load", default=None)
+    static_strain: float | None = column(
+        "1", "largest principal strain under both, less the free thermal strain", default=None
+    )
+    static_rotation_rad: float | None = column("rad", "largest rotation under both", default=None)
     skin_point: FloatArray | None = column("m", "points of the skin", along="skin_point xyz", default=None)
     skin_triangle: IntArray | None = column("1", "triangles of the skin", along="face corner", default=None)
     skin_cut: IntArray | None = column("1", "1 on a cyclic face, inside the wheel", along="face", default=None)

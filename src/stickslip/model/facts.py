@@ -6,10 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.model.fe.cell_laws import cell_laws
+from stickslip.model.fe.cell_laws import CellLaws
 from stickslip.model.fe.elements import Quadrature, cell_groups, chunks, gradients
-from stickslip.model.fe.material import Materials
-from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.units import RPM
@@ -60,7 +58,7 @@ def _facts_of_part(part: Part) -> Facts:
         low, high = _triple(corners.min(axis=0)), _triple(corners.max(axis=0))
         return Facts(part.body.mass, (x, y, z), low, high, 6, 0, 0)
     if part.mesh is not None and part.solid is not None:
-        return facts_of_solid(part.mesh, part.solid.material, part.structure.n)
+        return facts_of_solid(part.solid.laws, part.structure.n)
     return facts_of_matrices(part.structure)
 
 
@@ -141,9 +139,10 @@ _MEASURES: tuple[tuple[str, str, Callable[[Part], float]], ...] = (
 )
 
 
-def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
-    """Return the facts of a mesh with `dofs` free dofs; clamped nodes count."""
-    density = cell_laws(mesh, material).density(slice(0, len(mesh.cells)))
+def facts_of_solid(laws: CellLaws, dofs: int) -> Facts:
+    """Return the facts of a mesh and its materials with `dofs` free dofs; clamped nodes count."""
+    mesh = laws.mesh
+    density = laws.density(slice(0, len(mesh.cells)))
     mass, moment = 0.0, np.zeros(3)
     for group in cell_groups(mesh, Quadrature(DEGREE, DEGREE)):
         shape, own = group.strain, group.mesh

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.model.facts import facts_of_solid
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.readers.calculix_deck import Deck
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
@@ -52,6 +53,6 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[
     found = model_summary(model, n_modes=modes, units=system, say=LOG.info)
     if isinstance(model, Deck):
         materials = [model.materials[name] for name in model.cell_material]
-        facts = facts_of_solid(model.mesh, materials, 0)
+        facts = facts_of_solid(cell_laws(model.mesh, materials, model.temperature), 0)
         found = replace(found, whole_mass=facts.mass, centre=np.array(facts.centre))
     return [f"{name:<{WIDTH}}{value}" for name, value in found.rows()]

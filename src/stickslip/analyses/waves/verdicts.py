@@ -428,7 +428,7 @@ def _static(found: OfWaves) -> list[TextTable]:
         return []
     head = ("rpm", "largest displacement mm", "largest strain %", "largest rotation deg")
     cells = f"{rpm:g}", f"{1e3 * displacement:.4g}", f"{100 * strain:.3g}", f"{np.degrees(rotation):.3g}"
-    return [TextTable("Static displacement under the centrifugal load", head, (cells,))]
+    return [TextTable("Static displacement under the centrifugal load and thermal strain", head, (cells,))]
 
 
 def _at(found: Modes | Flutter) -> str:
