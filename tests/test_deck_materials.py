@@ -171,3 +171,10 @@ def test_heat_that_is_not_read_is_refused_by_line(tmp_path, old, new, message):
         return
     with pytest.raises(InputError, match=message):
         deck_of(tmp_path, text)
+
+
+def test_temperatures_that_a_deck_computes_are_not_read_in_silence(tmp_path):
+    deck = deck_of(tmp_path, HEATED + "*STEP\n*HEAT TRANSFER, STEADY STATE\n*END STEP\n")
+    assert "*HEAT TRANSFER: temperatures that this step computes; the given ones are taken" in deck.ignored[-1]
+    cold = deck_of(tmp_path, CUBE + "*STEP\n*HEAT TRANSFER, STEADY STATE\n*END STEP\n")
+    assert "HEAT TRANSFER" not in " ".join(cold.ignored)

@@ -26,6 +26,7 @@ from stickslip.model import (
     read_ansys_results,
 )
 from stickslip.model.facts import facts_of_solid
+from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.mesh.solid_mesh import by_kind
 from stickslip.model.readers.ansys_archive import ansys_passed_over
@@ -166,7 +167,7 @@ def test_a_sector_with_wedges_has_the_cells_and_volumes_of_the_other_reader(samp
     assert {width: len(rows) for width, rows in by_kind(mesh.cells)} == {6: 4, 8: 101}
     grid = theirs.Archive(str(samples / "sector.cdb")).grid
     volume = np.abs(grid.compute_cell_sizes()["Volume"]).sum()
-    assert facts_of_solid(mesh, Material(density=1.0), 0).mass == pytest.approx(volume, rel=1e-5)
+    assert facts_of_solid(cell_laws(mesh, Material(density=1.0)), 0).mass == pytest.approx(volume, rel=1e-5)
 
 
 def test_samples_cut_anywhere_are_refused(samples, tmp_path):

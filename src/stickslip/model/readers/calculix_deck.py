@@ -143,6 +143,10 @@ QUADRATURES = {
 EXACT_BRICKS = {"C3D8I": Quadrature(stiffness=3, mass=4, inner="mean"), "C3D8R": QUADRATURES["C3D8R"]}
 
 
+# steps whose temperatures are results
+HEAT_STEPS = ("HEAT TRANSFER", "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT")
+
+
 def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = (), plausible: bool = True) -> Deck:
     """Read an input deck of CalculiX or Abaqus.
 
@@ -208,7 +212,13 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
     used = np.isin(np.arange(len(mesh.points)), mesh.cells)
     depends = any(isinstance(m, ElasticMaterial) and (m.varies or m.expansion) for m in materials.values())
     heat = model.heat.of_nodes(mesh.numbers, used) if depends else None
-    if not depends:
+    if depends:
+        model.ignored += [
+            f"{block.place}: temperatures that this step computes; the given ones are taken"
+            for block in blocks
+            if block.keyword in HEAT_STEPS
+        ]
+    else:
         model.ignored += [f"{place}, on which no material depends" for place in model.heat.places]
     return Deck(
         replace(mesh, node_sets=node_sets),
