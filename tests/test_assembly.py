@@ -215,7 +215,7 @@ def test_what_is_wrong_with_a_model_is_named():
     chain = model.parts["chain"]
     several = replace(chain.structure, sets={**chain.structure.sets, "pair": np.array([2, 3])})
     refused(
-        r"contact.a.between: 'chain.pair' is not of the kind of 'chain.m1': single dofs and points, or of another number",
+        r"contact.a.between: 'chain.pair' has 2 dofs and 'chain.m1' 1",
         parts={**model.parts, "chain": replace(chain, structure=several)},
         contacts={"a": replace(one, between=("chain.pair", "chain.m1"))},
     )

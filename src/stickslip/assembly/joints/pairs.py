@@ -345,10 +345,19 @@ def _single_dofs(
     """Pair single dofs, in the order in which they are named."""
     key = f"contact.{name}"
     one, two = first.dofs, first.dofs[:0] if second is None else second.dofs
-    if first.surface is not None or (second is not None and len(one) != len(two)):
+    surfaces = [spot is not None and spot.surface is not None for spot in (first, second)]
+    if any(surfaces):
+        in_space, single = contact.between if surfaces[0] else contact.between[::-1]
         raise input_error(
             f"{key}.between",
-            f"{contact.between[0]!r} is not of the kind of {contact.between[1]!r}: single dofs and points, or of another number",
+            f"{in_space!r} has points in space, and {single!r} is a single dof, which moves along one line",
+            "Such a surface meets the nodes of a mesh or another surface. Between lumped masses or single dofs take a lumped damper "
+            "and a law between dofs, such as jenkins.",
+        )
+    if second is not None and len(one) != len(two):
+        raise input_error(
+            f"{key}.between",
+            f"{contact.between[0]!r} has {len(one)} dofs and {contact.between[1]!r} {len(two)}",
             "Pair single dofs with as many single dofs or the ground.",
         )
     refuse_without_direction(name, contact, first)

@@ -63,8 +63,10 @@ class Beam:
     """
 
     length: float = length("length of the beam", usual=1e4)
-    area: float = quantity("area of its section", "m2", above=0)
-    second_moment: float = quantity("second moment of area for its bending", "m4", above=0)
+    area: float = quantity("area of its section, of a rectangle width times height", "m2", above=0)
+    second_moment: float = quantity(
+        "second moment of area for its bending, of a rectangle width times height³ / 12", "m4", above=0
+    )
     material: Material = quantity("the table of its material")  # noqa: RUF009
     shear_coefficient: float | None = quantity(
         "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli", default=None, above=0, usual=2
