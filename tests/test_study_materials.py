@@ -281,3 +281,11 @@ def test_a_heated_part_is_checked_and_has_its_mass(folder):
     done = CliRunner().invoke(app, ["check", str(path)])
     assert done.exit_code == 0, done.output
     assert "mass 0.0942 kg" in done.output
+
+
+def test_a_temperature_without_effect_is_doubted(folder):
+    heat = "[temperature]\nuniform_c = 400.0\n[modes]\nnumber = 2\n"
+    (said,) = read_study(study(folder, STEEL, heat)).model().parts["blade"].warnings
+    assert said.startswith("part.blade: its temperature has no effect: the material has neither constants")
+    assert part_of(folder, STEEL + ROWS, "uniform_c = 400.0").warnings == ()
+    assert part_of(folder, STEEL, "").warnings == ()

@@ -35,7 +35,7 @@ from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.material import TemperatureTable
 from stickslip.study.file.model.parts import FileModel, SetTable
-from stickslip.study.models.temperature import temperature_of
+from stickslip.study.models.temperature import temperature_of, without_effect
 from stickslip.study.own_code import called
 from stickslip.units import RPM
 
@@ -372,6 +372,7 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     given, home, of_deck = heat
+    others["warnings"] = (*others.get("warnings", ()), *without_effect(key, given, material, of_deck))
     return solid_part(
         free,
         material,

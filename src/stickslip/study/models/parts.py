@@ -16,7 +16,6 @@ from stickslip.assembly.part_copies import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
-from stickslip.model.fe.cell_laws import Temperature
 from stickslip.model.fe.material import AnyMaterial, Material
 from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
@@ -36,7 +35,7 @@ from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
-from stickslip.study.models.temperature import temperature_of
+from stickslip.study.models.temperature import temperature_of, without_effect
 from stickslip.study.own_code import is_address, made, of_address, state_of
 from stickslip.units import DEG
 
@@ -123,9 +122,13 @@ class Workshop:
             raise input_error(f"part.{name}.material", "is missing", "Add the table [material], or one of the part.")
         return found
 
-    def _temperature(self, name: str, table: Any, mesh: SolidMesh, material: AnyMaterial) -> Temperature | None:
-        given = table.temperature or self.tables.temperature
-        return temperature_of(f"part.{name}", given, mesh, material, Axis(), home=self.home)
+    def _heat(self, name: str, table: Any, mesh: SolidMesh, material: AnyMaterial) -> dict[str, Any]:
+        """Return temperature and warnings of a meshed part."""
+        given, place = table.temperature or self.tables.temperature, f"part.{name}"
+        return {
+            "temperature": temperature_of(place, given, mesh, material, Axis(), home=self.home),
+            "warnings": without_effect(place, given, material),
+        }
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
         """Return damping and reduction of a part; `reduced`: whether it is reduced if the study specifies no reduction."""
@@ -145,16 +148,15 @@ class Workshop:
         LOG.info("meshing the part %s", name)
         mesh = mesh_blade_pair(build(BladePair, table), points)
         material = self._material(name, table)
-        heat = self._temperature(name, table, mesh, material)
-        return solid_part(mesh, material, temperature=heat, **self.others(table))
+        return solid_part(mesh, material, **self._heat(name, table, mesh, material), **self.others(table))
 
     def sector(self, name: str, table: Any) -> Part:
         """Mesh a sector of a bladed disk."""
         LOG.info("meshing the part %s, one of %d sectors", name, table.sectors)
         mesh = mesh_sector(build(BladedSector, table))
         material = self._material(name, table)
-        heat = self._temperature(name, table, mesh, material)
-        return solid_part(mesh, material, temperature=heat, sectors=table.sectors, **self.others(table))
+        heat = self._heat(name, table, mesh, material)
+        return solid_part(mesh, material, sectors=table.sectors, **heat, **self.others(table))
 
     def beam(self, name: str, table: Any) -> Part:
         """Make a beam along x."""

@@ -48,12 +48,11 @@ def temperature_of(
     InputError
         If a material depends on temperature and none is given, or a file lacks nodes.
     """
-    own = material if isinstance(material, Sequence) else [material]
-    kinds = [one for one in dict.fromkeys(own) if isinstance(one, ElasticMaterial)]
-    if not any(one.varies or one.expansion for one in kinds):
+    if not _depends(material):
         return None
     if table is None:
-        if of_deck is None and any(one.varies for one in kinds):
+        own = material if isinstance(material, Sequence) else [material]
+        if of_deck is None and any(isinstance(one, ElasticMaterial) and one.varies for one in dict.fromkeys(own)):
             raise input_error(
                 f"{place}.temperature",
                 "is missing, and its material depends on temperature",
@@ -67,6 +66,24 @@ def temperature_of(
         start = of_deck.start
     hot = _field(place, table, mesh, axis, home, of_deck)
     return Temperature(start + table.factor * (hot - start), start)
+
+
+def _depends(material: Materials) -> bool:
+    """Whether stiffness, density or size of a material depend on temperature."""
+    own = material if isinstance(material, Sequence) else [material]
+    kinds = (one for one in dict.fromkeys(own) if isinstance(one, ElasticMaterial))
+    return any(one.varies or one.expansion is not None for one in kinds)
+
+
+def without_effect(
+    place: str, table: TemperatureTable | None, material: Materials, of_deck: Temperature | None = None
+) -> tuple[str, ...]:
+    """Return a warning if a temperature is given for materials that do not depend on it; arguments as in `temperature_of`."""
+    if _depends(material) or (table is None and of_deck is None):
+        return ()
+    whose = "the deck's temperatures have" if table is None else "its temperature has"
+    why = "the material has neither constants over temperature nor thermal expansion"
+    return (f"{place}: {whose} no effect: {why}. Give material.over_temperature or expansion_per_k.",)
 
 
 def _field(
