@@ -220,6 +220,7 @@ def test_changes_of_the_peak_with_more_modes_and_fewer_points(monkeypatch: pytes
     model = SimpleNamespace(system=own, load=None)
     point = SimpleNamespace(converged=True, coefficients=np.zeros((2, 4)))
     monkeypatch.setattr(model_change, "replace", lambda p, **_: p)
+    monkeypatch.setattr(model_change, "_with_few_harmonics", lambda _, p: p)
     monkeypatch.setattr(model_change, "_richer", lambda _: ("richer", None))
     monkeypatch.setattr(model_change, "_coarser", lambda _: (fewer, 7))
     peaks = {id(own): at(2.0, 100.0), id("richer"): at(2.2, 101.0), id(fewer): at(1.9, 98.0)}

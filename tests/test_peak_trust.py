@@ -91,6 +91,19 @@ def test_the_change_with_more_modes_is_that_of_the_richer_model():
     assert abs(change) > 1e-3
 
 
+def test_peaks_are_compared_with_few_harmonics(monkeypatch):
+    """A peak with 31 harmonics: the change with more modes is the same with 15 of them, and with all."""
+    changes = []
+    for most in (15, 31):
+        monkeypatch.setattr("stickslip.analyses.forced_response.physics.model_change.MOST_HARMONICS", most)
+        sweep = {"low": 31, "high": 31, "selection": "always_high", "stability": "off", "points": 12}
+        data = chain(2).forced_response(hz=(36.0, 46.0), **sweep)["forced_response"]
+        changes.append(float(data["modes_peak_change"].values[0]))
+    assert abs(changes[1]) > 1e-3
+    assert changes[0] != changes[1]
+    assert changes[0] == pytest.approx(changes[1], rel=1e-2)
+
+
 def test_parts_that_keep_all_modes_have_no_richer_model():
     assert with_more_modes(chain(12)) is None
     assert with_more_modes(chain(2)).parts["ch"].reduction.n_modes == 3

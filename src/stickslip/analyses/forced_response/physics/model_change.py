@@ -29,6 +29,7 @@ UNKNOWN: Change = (float("nan"), float("nan"))
 BESIDE = 0.03  # half-width of a short sweep about a peak, relative to its frequency
 SWEPT_POINTS = 12  # points of this sweep
 PEAK_POINTS = 4  # points added to resolve its peak
+MOST_HARMONICS = 15  # of peaks that are compared, both alike; more change the comparison less than its last digit told
 AT_AN_END = 1e-9  # relative distance from an end of the sweep, below which a peak is no resonance
 
 
@@ -39,13 +40,14 @@ def model_changes(question: Question, response: Response) -> Values:
     richer, coarser = _richer(question), _coarser(question)
     top, model = response.top, question.model
     if top is not None and top.point.converged and (richer or coarser):
-        own = _found(question, model.system, model.load, top.point)
+        start = _with_few_harmonics(question, top.point)
+        own = _found(question, model.system, model.load, start)
         if richer is not None:
-            more = _change(response, own, _found(question, *richer, top.point))
+            more = _change(response, own, _found(question, *richer, start))
         if coarser is not None:
             system, left_out = coarser
             stays = np.isin(model.system.retained, system.retained)
-            point = replace(top.point, coefficients=top.point.coefficients[:, stays])
+            point = replace(start, coefficients=start.coefficients[:, stays])
             fewer = _change(response, own, _found(question, system, model.load, point))
     return stored(
         ModelChanges(
@@ -71,6 +73,17 @@ def stiffness_changes(question: Question, response: Response) -> Values:
             stiffness_frequency_slope_hz=unknown if slope is None else slope.omega / HZ,
         )
     )
+
+
+def _with_few_harmonics(question: Question, point: ForcedPoint) -> ForcedPoint:
+    """Return a point without the harmonics that a comparison of two peaks does not need."""
+    most = max(MOST_HARMONICS, 3 * max(question.model.load.harmonics))
+    rows = point.harmonics <= most
+    if np.all(rows):
+        return point
+    kept = point.kept[rows] if point.kept.size else point.kept
+    harmonics = point.harmonics[rows]
+    return replace(point, coefficients=point.coefficients[: harmonics[-1] + 1], harmonics=harmonics, kept=kept)
 
 
 def _at_resonance(question: Question, point: ForcedPoint) -> bool:
@@ -118,9 +131,7 @@ def _swept(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint)
 
 def _found(question: Question, system: System, load: HarmonicLoad, point: ForcedPoint) -> Found:
     """Find the peak of a system near a point; for listed frequencies and at ends of the sweep at the frequency of the point."""
-    own = point.support
-    few = min(question.sweep.peak_points, PEAK_POINTS)
-    sweep = replace(question.sweep, low=own, high=own, selection="always_high", peak_points=few)
+    own, sweep = point.support, _of_comparison(question, point)
     problem = forced_problem(system, load, sweep)
     if _at_resonance(question, point):
         peak = peak_from(problem, point) or _swept(system, load, sweep, point)
@@ -131,6 +142,12 @@ def _found(question: Question, system: System, load: HarmonicLoad, point: Forced
     if not found.status.converged:
         return None
     return problem, replace(point, coefficients=balance.coefficients(found.x))
+
+
+def _of_comparison(question: Question, point: ForcedPoint) -> Sweep:
+    """Return the sweep that finds a peak from a point, with its harmonics and few points."""
+    own, few = point.support, min(question.sweep.peak_points, PEAK_POINTS)
+    return replace(question.sweep, low=own, high=own, selection="always_high", peak_points=few)
 
 
 NO_SHIFT = (float("nan"), float("nan"))
@@ -147,12 +164,17 @@ def peak_shift(question: Question, response: Response) -> tuple[float, float]:
         Relative change of the peak amplitude, and change of its frequency in Hz; NaN without retention, without a peak, or where no
         periodic motion was found with a weaker retention.
     """
-    model = question.model
-    if model.retention == 0.0 or response.top is None:
+    model, top = question.model, response.top
+    if model.retention == 0.0 or top is None:
         return NO_SHIFT
-    point = first = response.top.point
-    own = point.support
-    sweep = replace(question.sweep, low=own, high=own, selection="always_high")
+    point = _with_few_harmonics(question, top.point)
+    fewer = point.order < top.point.order
+    own = _found(question, model.system, model.load, point) if fewer else (question.problem, point)
+    if own is None:
+        return NO_SHIFT
+    first = point = own[1]
+    before = own[0].amplitude(first, response.output) if fewer else response.peak_amplitude
+    sweep = _of_comparison(question, first)
     for share in WEAKER:
         held = model.bare.with_retention(share * model.retention)
         problem = forced_problem(held, model.load, sweep)
@@ -160,5 +182,4 @@ def peak_shift(question: Question, response: Response) -> tuple[float, float]:
         if again is None:
             return NO_SHIFT
         point = again
-    amplitude = problem.amplitude(point, response.output)
-    return amplitude / response.peak_amplitude - 1, (point.omega - first.omega) / HZ
+    return problem.amplitude(point, response.output) / before - 1, (point.omega - first.omega) / HZ
