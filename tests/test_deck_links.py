@@ -6,9 +6,11 @@ import scipy
 
 from stickslip import InputError
 from stickslip.assembly.locations import Places
+from stickslip.assembly.model import Model
 from stickslip.assembly.part_copies import copy_of
 from stickslip.model import assemble_deck, natural_frequencies, read_deck
 from stickslip.model.axis import Axis
+from stickslip.model.facts import facts_of_part
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.part import Place, solid_part
 
@@ -453,3 +455,17 @@ def test_hourglass_control_of_the_deck_is_told(tmp_path):
     assert read(tmp_path, text).ignored == (
         "*SECTION CONTROLS (deck.inp: line 32): give the factor of hourglass control of C3D8R in the study",
     )
+
+
+def test_point_masses_count_and_rigid_bodies_do_not_turn(tmp_path):
+    text = bricks() + STEEL + ROOT + "*NODE\n50, 0.4, 0.05, 0.05\n*NSET, NSET=END\n13, 14, 15, 16\n"
+    text += "*ELEMENT, TYPE=MASS, ELSET=M\n90, 50\n*MASS, ELSET=M\n2.5\n*RIGID BODY, NSET=END, REF NODE=50\n"
+    deck = read(tmp_path, text)
+    part = solid_part(deck.mesh, deck.material, quadrature=deck.quadrature, links=deck.links)
+    own = 0.3 * 0.1 * 0.1 * 7850
+    facts = facts_of_part(part)
+    np.testing.assert_allclose(facts.mass, own + 2.5, rtol=1e-12)
+    np.testing.assert_allclose(facts.centre[0], (own * 0.15 + 2.5 * 0.4) / (own + 2.5), rtol=1e-12)
+    Model(parts={"bar": part})
+    with pytest.raises(InputError, match=r"\*RIGID BODY: a rigid body: right for small rotations alone"):
+        Model(parts={"bar": part}, speed=10.0)

@@ -144,6 +144,9 @@ class Model:
                 raise input_error(name, "is of one wheel, and a join couples several", "Leave one out.")
             one.require(self.sectors)
         refuse_contacts_of_dofs(self.places, self.contacts)
+        for part in self.parts.values():
+            if part.solid is not None and (self.speed or part.solid.heated):
+                part.solid.refuse_small_rotations()
 
     def __repr__(self) -> str:
         """Return a description in one line."""

@@ -176,4 +176,5 @@ def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> Ro
         followers,
         solid.small,
         solid.temperature,
+        solid.point_mass,
     )

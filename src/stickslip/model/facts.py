@@ -1,7 +1,7 @@
 """Mass, centre of mass, size and counts of a model."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,8 +58,18 @@ def _facts_of_part(part: Part) -> Facts:
         low, high = _triple(corners.min(axis=0)), _triple(corners.max(axis=0))
         return Facts(part.body.mass, (x, y, z), low, high, 6, 0, 0)
     if part.mesh is not None and part.solid is not None:
-        return facts_of_solid(part.solid.laws, part.structure.n)
+        found = facts_of_solid(part.solid.laws, part.structure.n)
+        return _with_points(found, part.mesh.points, part.solid.point_mass)
     return facts_of_matrices(part.structure)
+
+
+def _with_points(facts: Facts, points: FloatArray, point_mass: FloatArray | None) -> Facts:
+    """Add the point masses (nodes,) in kg of a part at the points (nodes, 3) of its nodes."""
+    if point_mass is None:
+        return facts
+    mass = facts.mass + float(point_mass.sum())
+    centre = (facts.mass * np.array(facts.centre) + point_mass @ points) / mass
+    return replace(facts, mass=mass, centre=_triple(centre))
 
 
 def facts_of_parts(parts: Iterable[Part]) -> Facts:

@@ -79,6 +79,8 @@ class RotatingSolid:
         (3 nodes, n) CSR from the dofs to the x, y, z of all nodes, some of which follow others by equations; None if none does.
     small
         As in `Links`.
+    point_mass
+        (nodes,) point masses in kg, which `nodal_mass` includes; None if there are none.
     temperature
         Temperatures of the nodes; None: no thermal strain.
     """
@@ -94,6 +96,7 @@ class RotatingSolid:
     followers: Matrix | None = None
     small: str = ""
     temperature: Temperature | None = None
+    point_mass: FloatArray | None = None
     _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
     _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(default_factory=dict, init=False, repr=False)
 
@@ -230,7 +233,7 @@ class RotatingSolid:
                 f"tangent {tangent!r} is no polynomial of the speed",
                 "Use 'consistent' or 'textbook', or at_speed.",
             )
-        self._refuse_small()
+        self.refuse_small_rotations()
         if hot is None and self.heated:
             hot = self._hot_displacement(tie)
         others = b"" if hot is None else hot.tobytes()
@@ -357,13 +360,14 @@ class RotatingSolid:
         if not math.isfinite(speed):
             raise input_error("speed", f"must be a number in rad/s, got {speed}", "Give rad/s.")
         if speed != 0.0:
-            self._refuse_small()
+            self.refuse_small_rotations()
 
-    def _refuse_small(self) -> None:
+    def refuse_small_rotations(self) -> None:
+        """Refuse links that are right for small rotations only; the message names the first by its line."""
         if self.small:
             raise input_error(
                 self.small,
-                "right for small rotations alone, but steady rotation loads it, and then it changes the stiffness at second order, as "
+                "right for small rotations alone; a load of rotation or heat makes it change the stiffness at second order, as "
                 "the weight of a pendulum does",
                 "Compute it at rest, or model that body by elements.",
             )
@@ -427,8 +431,9 @@ def rotating_solid(
     nodal_mass = scipy.sparse.csr_array(own[::3][:, ::3])
     load = load[moving] if onto is None else np.asarray(onto.T @ load)
     small = "" if links is None else links.small
+    points = None if links is None or not links.mass.any() else links.mass
     return RotatingSolid(
-        structure, mesh, material, axis, quadrature, moving, nodal_mass, load, onto, small, temperature
+        structure, mesh, material, axis, quadrature, moving, nodal_mass, load, onto, small, temperature, points
     )
 
 
