@@ -272,6 +272,11 @@ def test_a_beam_of_calculix_keeps_a_distance(tmp_path):
     [
         ("*EQUATION\n3\n5, 1, 1., 9, 1, -1.\n", r"line 33: announces 3 terms and has 6 numbers"),
         ("*EQUATION\n2\n5, 7, 1., 9, 1, -1.\n", "the direction 7"),
+        ("*EQUATION\n2\n5, 1, , 9, 1, -1.\n", "the coefficient '' is no finite number"),
+        (
+            "*EQUATION\n2\n5, 1, 1., 9, 1, -1.\n*NSET, NSET=B\n5\n*TRANSFORM, NSET=B\n1., 1., 0., 0., 1., 0.\n",
+            "turns the axes of node 5, which a line above supports or ties",
+        ),
         (
             "*EQUATION\n2\n5, 4, 1., 9, 1, -1.\n",
             r"\*EQUATION: names the rotation 4 of node 5, which is no reference node",
@@ -291,7 +296,7 @@ def test_a_beam_of_calculix_keeps_a_distance(tmp_path):
         ),
         (
             "*NSET, NSET=B\n1\n*TRANSFORM, NSET=B\n1., 1., 0., 0., 1., 0.\n",
-            r"\*TRANSFORM: turns the axes of node 1, which a line above supports",
+            r"\*TRANSFORM: turns the axes of node 1, which a line above supports or ties",
         ),
         ("*NSET, NSET=B\n9\n*TRANSFORM, NSET=B\n1., 0., 0., 2., 0., 0.\n", "gives a node at .* no axes"),
         ("*ELEMENT, TYPE=SPRING2, ELSET=A\n90, 5, 6\n*SPRING, ELSET=A\n1\n3.\n", "gives the directions .1."),

@@ -100,7 +100,7 @@ def read_equation(links: DeckLinks, block: Block, nodes: Nodes) -> None:
     """
     fields: list[tuple[str, str]] = []
     for place, row in block.rows():
-        fields += [(place, text) for text in row if text]
+        fields += [(place, text) for text in row]
     while fields:
         place, text = fields[0]
         count = whole_number(text, place, "number of terms")
@@ -152,10 +152,13 @@ def read_transform(links: DeckLinks, block: Block, nodes: Nodes, table: NodeTabl
     place, fields = rows[0]
     a, b = np.array([real_number(text, place, "coordinate") for text in fields[:6]]).reshape(2, 3)
     numbers = nodes(name, block.place)
-    late = np.intersect1d(numbers, held)
+    tied = [node for place, vector in links.equations if place.endswith("*EQUATION") for node, _, _ in vector]
+    late = np.intersect1d(numbers, [*held, *tied])
     if late.size:
         raise input_error(
-            block.place, f"turns the axes of node {late[0]}, which a line above supports", "Put it above *BOUNDARY."
+            block.place,
+            f"turns the axes of node {late[0]}, which a line above supports or ties",
+            "Put it above *BOUNDARY and *EQUATION.",
         )
     for number, point in zip(numbers, table.points[table.index(numbers)], strict=True):
         links.turns[int(number)] = _axes(kind, a, b, point, place)

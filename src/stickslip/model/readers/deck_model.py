@@ -232,7 +232,7 @@ def _connectivity(model: DeckModel, block: Block, count: int) -> Iterator[list[i
     row: list[int] = []
     place, surplus = block.place, 0
     for place, fields in block.rows():
-        row += [whole_number(text, place, "node") for text in fields if text]
+        row += [whole_number(text, place, "node") for text in fields]
         if len(row) > count:
             surplus += len(row) > count + 1
             if min(row[: count + 1]) < 0:
