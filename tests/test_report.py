@@ -543,9 +543,9 @@ def test_the_answer_is_the_smallest_peak_of_the_best_verdict_and_says_what_to_do
     assert f"mm is doubtful with {order[0].label}." in card.note
     values = sorted(c.value for c in view.cases)
     if order[1].value in (values[0], values[-1]):
-        assert card.note.endswith(f"Next: compute beyond {order[1].label}, a smaller one may lie there.")
+        assert card.note.endswith(f"Next: compute beyond ratio {order[1].value:g}, a smaller one may lie there.")
     else:
-        assert card.note.endswith(f"Next: refine between {KEY} = 5 and {KEY} = 50.")
+        assert card.note.endswith("Next: refine ratio between 5 and 50.")
 
 
 def test_checks_name_their_case_and_what_decided() -> None:

@@ -145,10 +145,13 @@ def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
     if not key:
         return [] if len(response.cases) > 1 else [f"Next: vary the load or the damper ({VARY})"]
     family = next(own for own in families_of(response.data, key, response.peaked).values() if best in own)
-    at = family.index(best)
+    at, naming = family.index(best), naming_of(response.data, key)
     if at in (0, len(family) - 1):
-        return [f"Next: compute beyond {best.label}, a smaller one may lie there"] if len(family) > 1 else []
-    return [f"Next: refine between {family[at - 1].label} and {family[at + 1].label}"]
+        return (
+            [f"Next: compute beyond {naming.name(best.value)}, a smaller one may lie there"] if len(family) > 1 else []
+        )
+    low, high = (naming.value(family[k].value) for k in (at - 1, at + 1))
+    return [f"Next: refine {naming.word} between {low} and {high}"]
 
 
 def _operation_card(response: Response) -> Card | None:
