@@ -289,3 +289,20 @@ def test_a_temperature_without_effect_is_doubted(folder):
     assert said.startswith("part.blade: its temperature has no effect: the material has neither constants")
     assert part_of(folder, STEEL + ROWS, "uniform_c = 400.0").warnings == ()
     assert part_of(folder, STEEL, "").warnings == ()
+
+
+def test_temperatures_of_calculix_results_are_the_static_ones(folder):
+    """Format as ccx 2.20 writes it; it repeats the temperatures at each mode."""
+    mesh = part_of(folder, STEEL, "").mesh
+    places = "".join(
+        f" -1{n:10d}" + "".join(f"{x:12.5E}" for x in p) + "\n" for n, p in zip(mesh.numbers, mesh.points, strict=True)
+    )
+    text = f"    1C\n    2C{len(mesh.numbers):30d}{1:38d}\n{places} -3\n"
+    for step, head in ((1, "  101 1.000000000"), (2, "  102 2281.658471")):
+        values = "".join(f" -1{n:10d}{step * (300.0 + n):12.5E}\n" for n in mesh.numbers)
+        text += f"    1PSTEP{step:26d}{1:12d}{step:12d}\n"
+        tail = "                     0    1           1" if step == 1 else "                     2    2MODAL      1"
+        text += f"  100CL{head}{len(mesh.numbers):12d}{tail}\n -4  NDTEMP      1    1\n -5  T           1    1    0    0\n{values} -3\n"
+    (folder / "heat.frd").write_text(text + " 9999\n")
+    part = part_of(folder, STEEL + ROWS, 'file = "heat.frd"')
+    np.testing.assert_allclose(part.solid.temperature.values, 300 + part.mesh.numbers)

@@ -110,9 +110,11 @@ def _by_node(path: Path, mesh: SolidMesh) -> FloatArray:
     numbers: FloatArray
     values: FloatArray
     if ".frd" in "".join(path.suffixes[-2:]).lower():
-        fields = [one for one in read_frd(path).fields if one.name == "NDTEMP"]
+        fields = [one for one in read_frd(path).fields if one.name == "NDTEMP" and one.frequency_hz is None]
         if not fields:
-            raise input_error(str(path), "has no field NDTEMP", "Write temperatures (*NODE FILE, NT).")
+            raise input_error(
+                str(path), "has no static field NDTEMP", "Write the temperatures of the static step (*NODE FILE, NT)."
+            )
         numbers, values = fields[-1].nodes.astype(float), np.real(fields[-1].values[:, 0])
     else:
         columns = csv_columns(path, ("node", "temperature_c"))
