@@ -13,6 +13,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.part_reduction import Spin, at_speed
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
+from stickslip.model.damping import Damping
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
 from stickslip.model.matrices_at_speeds import AtSpeed, speed_matrices, warnings_of
@@ -277,6 +278,45 @@ def test_a_sector_of_matrices_is_the_sector_that_wrote_them():
     for wave in (0, 2):
         exact, found = (natural_frequencies(own.at(RPM * 7000.0, wave), 4) for own in (one, other))
         np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+@pytest.mark.validation
+def test_a_run_up_of_matrices_is_that_of_the_mesh():
+    sectors = 9
+    mesh = annular_sector(0.1, 0.2, 0.02, sectors=sectors, divisions=(3, 3, 1))
+    at = mesh.points
+    rim = np.flatnonzero((np.hypot(at[:, 0], at[:, 1]) > 0.1999) & (abs(at[:, 1]) < 1e-6) & (at[:, 2] > 0.009))
+    mesh = replace(mesh, node_sets=mesh.node_sets | {"point": rim})
+    meshed = solid_part(mesh, STEEL, sectors=sectors, clamped=("root",))
+    alone = ss.Model(parts={"disk": meshed})
+    steady = alone.steady["disk"]
+    known = [
+        AtSpeed(
+            s, at_speed("disk", meshed, Spin(s, coriolis=True), steady), steady.displacement(meshed, s) if s else None
+        )
+        for s in SPEEDS
+    ]
+    turning = speed_matrices(known, meshed.axis)
+    stored = structure_part(meshed.structure, turning=turning, sectors=sectors, axis=meshed.axis)
+
+    def peak(part):
+        law = ss.ElasticCoulomb(k_t=2e6, k_w=2e6, k_n=2e6, mu=0.3)
+        model = ss.Model(
+            parts={"disk": replace(part, damping=Damping(alpha=10.0, beta=1e-7), reduction=Reduction(8))},
+            contacts={
+                "pad": ss.Contact(
+                    between=("disk.point", "ground"), law=law, tangent=(0, 0, 1), normal=(1, 0, 0), preload=60.0
+                )
+            },
+            loads={"gas": ss.Load(on="disk.point", newton=3.0, direction=(0, 0, 1), engine_order=12)},
+            outputs=(ss.Output(name="rim", on="disk.point"),),
+        )
+        data = model.run_up(speeds_rpm=(10800.0, 11900.0), engine_orders=[12], points=8)["run_up"]
+        return float(data["peak_amplitude"].values.item()), float(data["peak_speed_rpm"].values.item())
+
+    own, other = peak(meshed), peak(stored)
+    assert 10900.0 < own[1] < 11800.0  # a resonance, no end of the range
+    np.testing.assert_allclose(other, own, rtol=1e-7)
 
 
 def lattice(supports):
