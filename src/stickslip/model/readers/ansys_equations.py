@@ -91,6 +91,9 @@ def _equations(blocks: Blocks) -> list[tuple[str, list[Term]]]:
             raise input_error(place, f"is no homogeneous equation with a number ({','.join(words[:5])})", LEAVE_OUT)
         own = found.setdefault(number, (place, []))[1]
         own += _three(terms)
+    for place, own in found.values():
+        if not own:
+            raise input_error(place, "is an equation without terms", "Give node, label and coefficient of each term.")
     return [*found.values()]
 
 
