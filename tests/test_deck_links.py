@@ -11,6 +11,7 @@ from stickslip.assembly.part_copies import copy_of
 from stickslip.model import assemble_deck, natural_frequencies, read_deck
 from stickslip.model.axis import Axis
 from stickslip.model.facts import facts_of_part
+from stickslip.model.fe.free_solid import rigid_motions
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.part import Place, solid_part
 
@@ -474,3 +475,57 @@ def test_point_masses_count_and_rigid_bodies_do_not_turn(tmp_path):
     Model(parts={"bar": part})
     with pytest.raises(InputError, match=r"\*RIGID BODY: a rigid body: right for small rotations alone"):
         Model(parts={"bar": part}, speed=10.0)
+
+
+def test_a_massless_direction_without_stiffness_is_left_out(tmp_path):
+    """One coupled node turns its reference node freely: the direction that only that rotation followed is no dof."""
+    text = (
+        bricks() + STEEL + ROOT + "*NODE\n50, 0.4, 0.05, 0.05\n*NSET, NSET=END\n13\n*SURFACE, NAME=S1, TYPE=NODE\nEND\n"
+    )
+    coupled = text + "*COUPLING, CONSTRAINT NAME=C, REF NODE=50, SURFACE=S1\n*KINEMATIC\n1, 1\n3, 3\n"
+    found = every_frequency(assemble_deck(read(tmp_path, coupled)))
+    np.testing.assert_allclose(found, every_frequency(assemble_deck(read(tmp_path, text))), rtol=1e-12)
+
+
+def test_a_point_mass_that_nothing_holds_moves_at_no_frequency(tmp_path):
+    text = (
+        bricks()
+        + STEEL
+        + ROOT
+        + "*NODE\n50, 0.4, 0.05, 0.05\n*ELEMENT, TYPE=MASS, ELSET=M\n90, 50\n*MASS, ELSET=M\n2.5\n"
+    )
+    text += "*NSET, NSET=END\n13, 14, 15, 16\n*SURFACE, NAME=S1, TYPE=NODE\nEND\n"
+    text += "*COUPLING, CONSTRAINT NAME=C, REF NODE=50, SURFACE=S1\n*KINEMATIC\n1\n3\n"
+    deck = read(tmp_path, text)
+    solid = rotating_solid(deck.mesh, *deck.materials.values(), Axis(), clamped=("root",), links=deck.links)
+    assert rigid_motions(solid).shape[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("cards", "said"),
+    [
+        ("*EQUATION\n2\n5, 1, 1., 77, 1, -1.\n", "line 34: names node 77, which the deck lacks"),
+        (
+            "*SURFACE, NAME=S1, TYPE=NODE\nR\n*COUPLING, CONSTRAINT NAME=C, REF NODE=5, SURFACE=S1\n*KINEMATIC\n7\n",
+            "line 36: the directions 7 to 7",
+        ),
+        ("*ELEMENT, TYPE=MASS, ELSET=M\n90, 5\n*MASS, ELSET=M\n-2.5\n", "the mass -2.5"),
+        # ccx 2.20 takes the last mass alone, and a spring along the global direction
+        ("*ELEMENT, TYPE=MASS, ELSET=M\n90, 5\n" + 2 * "*MASS, ELSET=M\n2.5\n", "gives element 90 a second"),
+        (
+            (
+                "*NSET, NSET=T\n5\n*TRANSFORM, NSET=T\n1., 2., 0., -2., 1., 0.\n"
+                "*ELEMENT, TYPE=SPRING1, ELSET=P\n90, 5\n*SPRING, ELSET=P\n2\n1.E8\n"
+            ),
+            "along a direction of node 5, whose axes",
+        ),
+    ],
+)
+def test_what_no_structure_has_is_refused_by_line(tmp_path, cards, said):
+    with pytest.raises(InputError, match=said):
+        read(tmp_path, bricks() + STEEL + ROOT + cards)
+
+
+def test_an_element_without_its_mass_is_told(tmp_path):
+    deck = read(tmp_path, bricks() + STEEL + ROOT + "*ELEMENT, TYPE=MASS, ELSET=M\n90, 5\n")
+    assert deck.ignored == ("elements MASS without *MASS: 1, e.g. 90",)

@@ -96,7 +96,8 @@ def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray
     motions = every[solid.moving]
     stiffness = scipy.sparse.csr_array(solid.structure.stiffness)
     cost = (abs(stiffness) @ np.abs(motions)).max(axis=1, keepdims=True)
-    hindered = [(stiffness @ motions) / (ROUNDING_FORCE * cost)]
+    # a point mass without stiffness in a direction moves there at no cost
+    hindered = [(stiffness @ motions) / (ROUNDING_FORCE * np.where(cost > 0, cost, 1.0))]
     if tie is not None:
         hindered.append((motions - tie @ _on(tie, motions)) / MISMATCH)
     allowed = np.vstack(hindered)

@@ -120,7 +120,10 @@ def support(
         loose = np.setdiff1d(np.arange(len(still)), mesh.cells)  # as reference nodes, which loads act on
         counts[loose] += len(mesh.node_sets) + 1
         found = eliminate(links, fixed.ravel() | _idle(mass, stiffness, links), counts)
-        moving, onto = found.moving, found.onto
+        # a rotation that one equation determines leaves a massless reference node without a direction that anything resists
+        inert = sum(abs(scipy.sparse.csr_array(m)) @ np.ones(m.shape[0]) for m in (mass, damping, stiffness)) == 0
+        felt = scipy.sparse.csr_array(abs(found.onto).T @ scipy.sparse.diags_array(1.0 - inert)).sum(axis=1) > 0
+        moving, onto = found.moving[felt], found.onto[:, felt]
     new = np.full(fixed.size, -1)
     new[moving] = np.arange(len(moving))
     sets = {}

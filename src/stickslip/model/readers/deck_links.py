@@ -37,6 +37,8 @@ class DeckLinks:
         Node and direction of rotations of reference nodes that are held.
     elements
         Element number -> kind and nodes of masses, springs and dashpots.
+    valued
+        Numbers of those whose mass, stiffness or damping was read.
     masses
         Node and mass of each point mass.
     springs, dashpots
@@ -54,6 +56,7 @@ class DeckLinks:
     turns: dict[int, FloatArray] = field(default_factory=dict)
     held_angles: set[tuple[int, int]] = field(default_factory=set)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    valued: set[int] = field(default_factory=set)
     masses: list[tuple[int, float]] = field(default_factory=list)
     springs: list[tuple[Vector, float]] = field(default_factory=list)
     dashpots: list[tuple[Vector, float]] = field(default_factory=list)
@@ -206,7 +209,11 @@ def read_coupling(
     for place, fields in block.rows():
         first = whole_number(fields[0], place, "direction")
         last = whole_number(fields[1], place, "direction") if len(fields) > 1 and fields[1] else first
-        directions |= set(range(max(first, 1), min(last, 6) + 1))
+        if not 1 <= first <= last <= 6:
+            raise input_error(
+                place, f"the directions {first} to {last}", "Directions count from 1 to 6, the lower first."
+            )
+        directions |= set(range(first, last + 1))
     own = tuple(sorted((directions or {1, 2, 3}) & {1, 2, 3}))
     if not own:
         raise input_error(block.place, "names no direction from 1 to 3", "Nodes of solids have these alone.")
@@ -372,24 +379,37 @@ def read_point_property(links: DeckLinks, block: Block, elements: IntArray, tabl
         )
     place, fields = rows[-1]
     value = real_number(fields[0], place, "value")
+    if family == "MASS" and value < 0:
+        raise input_error(place, f"the mass {value:g}", "A point mass is zero or greater.")
     along = [whole_number(text, rows[0][0], "direction") for text in rows[0][1] if text] if directions else []
     if directions and (len(along) != directions[0] or not all(1 <= d <= 3 for d in along)):
         raise input_error(rows[0][0], f"gives the directions {along}", f"{kind} needs {directions[0]}, from 1 to 3.")
     for number in elements:
         nodes = links.elements[int(number)][1]
+        if int(number) in links.valued:
+            raise input_error(
+                block.place, f"gives element {number} a second *{family}", "Keep one: CalculiX takes the last."
+            )
+        links.valued.add(int(number))
+        turned = [node for node in nodes if node in links.turns]
+        if directions and turned:
+            raise input_error(
+                block.place,
+                f"acts along a direction of node {turned[0]}, whose axes *TRANSFORM turns",
+                "CalculiX takes the global direction here: take the node out of *TRANSFORM, or give a SPRINGA or DASHPOTA along the direction.",
+            )
         if family == "MASS":
             links.masses.append((nodes[0], value))
         else:
             target = links.springs if family == "SPRING" else links.dashpots
-            target.append((_elongation(links, nodes, along, table, block.place), value))
+            target.append((_elongation(nodes, along, table, block.place), value))
     if family == "SPRING":
         links.linear(block.place, "a spring")
 
 
-def _elongation(links: DeckLinks, nodes: list[int], along: list[int], table: NodeTable, place: str) -> Vector:
+def _elongation(nodes: list[int], along: list[int], table: NodeTable, place: str) -> Vector:
     if along:
-        first = links.along(nodes[0], along[0])
-        return first if len(along) == 1 else [*first, *links.along(nodes[1], along[1], -1.0)]
+        return [(node, d, sign) for node, d, sign in zip(nodes, along, (1.0, -1.0), strict=False)]
     start, end = table.points[table.index(np.array(nodes))]
     length = float(np.linalg.norm(end - start))
     if length == 0.0:

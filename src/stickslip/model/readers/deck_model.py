@@ -118,7 +118,17 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
             raise _refused(block)
     _rotation_nodes(model)
     _check_repeated(model)
+    _tell_bare(model)
     return model
+
+
+def _tell_bare(model: DeckModel) -> None:
+    """List point elements whose mass, stiffness or damping the deck does not give."""
+    for family in ("MASS", "SPRING", "DASHPOT"):
+        own = [n for n, (kind, _) in model.links.elements.items() if kind.startswith(family)]
+        bare = [n for n in own if n not in model.links.valued]
+        if bare:
+            model.ignored.append(f"elements {family} without *{family}: {len(bare)}, e.g. {bare[0]}")
 
 
 def _rotation_nodes(model: DeckModel) -> None:
@@ -282,9 +292,10 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
         return model.nodes.node_sets[text.upper()]
     if not text.lstrip("+-").isdigit():
         raise unknown(place, "node set", text.upper(), list(model.nodes.node_sets))
-    number = np.array([whole_number(text, place, "node")])
-    model.nodes.index(number)
-    return number
+    number = whole_number(text, place, "node")
+    if number not in model.nodes.numbers:
+        raise input_error(place, f"names node {number}, which the deck lacks", "Check the number, or add the node.")
+    return np.array([number])
 
 
 OTHER_FIELDS = (0, 8, 11)  # directions of temperature and electric potential
