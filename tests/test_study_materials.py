@@ -306,3 +306,21 @@ def test_temperatures_of_calculix_results_are_the_static_ones(folder):
     (folder / "heat.frd").write_text(text + " 9999\n")
     part = part_of(folder, STEEL + ROWS, 'file = "heat.frd"')
     np.testing.assert_allclose(part.solid.temperature.values, 300 + part.mesh.numbers)
+
+
+def test_temperatures_beyond_the_table_and_radii_in_mm_are_doubted(folder):
+    """Radii in mm, as 20 and 60, would give one temperature in silence."""
+    (said,) = part_of(folder, STEEL + ROWS, "radius_m = [20.0, 60.0]\nat_radius_c = [400.0, 500.0]").warnings
+    assert said.startswith("part.blade: it lies ")
+    assert "far from the radii of its temperature, 20 to 60 m" in said
+    (said,) = part_of(folder, STEEL + ROWS, "uniform_c = 1500.0").warnings
+    assert said.startswith("part.blade: its temperatures reach 1500 °C, and its constants are those from 20 to ")
+
+
+def test_one_row_over_temperature_is_told_alone(folder):
+    row = ROWS[: ROWS.rindex("[[")]
+    with pytest.raises(InputError) as told:
+        part_of(folder, STEEL + row, "uniform_c = 400.0")
+    assert str(told.value).endswith(
+        "part.blade.material: has one row of over_temperature, at 20 °C. Give another row, or its constants in [material] itself."
+    )

@@ -35,7 +35,7 @@ from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.material import TemperatureTable
 from stickslip.study.file.model.parts import FileModel, SetTable
-from stickslip.study.models.temperature import temperature_of, without_effect
+from stickslip.study.models.temperature import doubts_of_temperature, temperature_of
 from stickslip.study.own_code import called
 from stickslip.units import RPM
 
@@ -372,12 +372,14 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     given, home, of_deck = heat
-    others["warnings"] = (*others.get("warnings", ()), *without_effect(key, given, material, of_deck))
+    temperature = temperature_of(key, given, free, material, axis, home=home, of_deck=of_deck)
+    doubts = doubts_of_temperature(key, given, free, material, axis, temperature or of_deck)
+    others["warnings"] = (*others.get("warnings", ()), *doubts)
     return solid_part(
         free,
         material,
         axis,
-        temperature=temperature_of(key, given, free, material, axis, home=home, of_deck=of_deck),
+        temperature=temperature,
         sectors=sectors,
         faces=faces,
         cyclic=_tied(table),

@@ -35,7 +35,7 @@ from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
-from stickslip.study.models.temperature import temperature_of, without_effect
+from stickslip.study.models.temperature import doubts_of_temperature, temperature_of
 from stickslip.study.own_code import is_address, made, of_address, state_of
 from stickslip.units import DEG
 
@@ -125,9 +125,10 @@ class Workshop:
     def _heat(self, name: str, table: Any, mesh: SolidMesh, material: AnyMaterial) -> dict[str, Any]:
         """Return temperature and warnings of a meshed part."""
         given, place = table.temperature or self.tables.temperature, f"part.{name}"
+        found = temperature_of(place, given, mesh, material, Axis(), home=self.home)
         return {
-            "temperature": temperature_of(place, given, mesh, material, Axis(), home=self.home),
-            "warnings": without_effect(place, given, material),
+            "temperature": found,
+            "warnings": doubts_of_temperature(place, given, mesh, material, Axis(), found),
         }
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:

@@ -16,6 +16,8 @@ from stickslip.model.readers.node_table import csv_columns, csv_numbers
 from stickslip.study.file.model.material import FileTemperature, TemperatureTable
 
 STRESS_FREE_C = 20.0
+BEYOND = 0.05  # of a table's range: by so much temperatures may leave it without a word, as 20 °C a table from 25 °C
+FAR = 10.0  # radii so many times those of the part are in another unit
 
 
 def temperature_of(
@@ -75,15 +77,53 @@ def _depends(material: Materials) -> bool:
     return any(one.varies or one.expansion is not None for one in kinds)
 
 
-def without_effect(
-    place: str, table: TemperatureTable | None, material: Materials, of_deck: Temperature | None = None
+def doubts_of_temperature(
+    place: str,
+    table: TemperatureTable | None,
+    mesh: SolidMesh,
+    material: Materials,
+    axis: Axis,
+    found: Temperature | None,
 ) -> tuple[str, ...]:
-    """Return a warning if a temperature is given for materials that do not depend on it; arguments as in `temperature_of`."""
-    if _depends(material) or (table is None and of_deck is None):
-        return ()
-    whose = "the deck's temperatures have" if table is None else "its temperature has"
-    why = "the material has neither constants over temperature nor thermal expansion"
-    return (f"{place}: {whose} no effect: {why}. Give material.over_temperature or expansion_per_k.",)
+    """Return warnings: temperatures that the materials do not depend on, radii far from the part, and temperatures beyond the materials' tables.
+
+    Parameters
+    ----------
+    place, table, mesh, material, axis
+        As in `temperature_of`.
+    found
+        The temperatures of the part, of the study or its deck.
+    """
+    if found is None or not _depends(material):
+        if table is None and found is None:
+            return ()
+        whose = "the deck's temperatures have" if table is None else "its temperature has"
+        why = "the material has neither constants over temperature nor thermal expansion"
+        return (f"{place}: {whose} no effect: {why}. Give material.over_temperature or expansion_per_k.",)
+    used = np.unique(mesh.cells[mesh.cells >= 0])
+    said = []
+    if table is not None and table.radius_m is not None:
+        radius = np.linalg.norm(axis.arm(mesh.points[used]), axis=1)
+        (low, high), (first, last) = (radius.min(), radius.max()), table.radius_m
+        if FAR * high < first or low > FAR * last:
+            said.append(
+                f"{place}: it lies {low:.4g} to {high:.4g} m from the axis, far from the radii of its temperature, {first:g} to {last:g} m, "
+                "and has one temperature. Give radius_m in m, and the axis of the part."
+            )
+    own = material if isinstance(material, Sequence) else [material]
+    tables = [one.elastic.temperatures for one in dict.fromkeys(own) if isinstance(one, ElasticMaterial)]
+    ends = [(rows[0], rows[-1]) for rows in tables if len(rows) > 1]
+    if ends:
+        low, high = max(a for a, _ in ends), min(b for _, b in ends)
+        coldest, hottest = found.values[used].min(), found.values[used].max()
+        margin = BEYOND * (high - low)
+        if coldest < low - margin or hottest > high + margin:
+            reached = hottest if hottest > high + margin else coldest
+            said.append(
+                f"{place}: its temperatures reach {reached:.4g} °C, and its constants are those from {low:g} to {high:g} °C; beyond, the "
+                "last row holds. Give rows that reach further."
+            )
+    return tuple(said)
 
 
 def _field(

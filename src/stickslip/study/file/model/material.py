@@ -266,6 +266,12 @@ class _PlausibleMaterial(Section):
         yield from problems_of_kind(given)
         anisotropic = {*ORTHOTROPIC, "shear_modulus_pa", "elasticity_pa"}
         rows: list[Any] = getattr(self, "over_temperature", None) or []
+        if len(rows) == 1:
+            yield custom_error(
+                f"has one row of over_temperature, at {rows[0].temperature_c:g} °C",
+                "Give another row, or its constants in [material] itself.",
+            )
+            return
         kinds = [frozenset(row.model_fields_set - {"temperature_c"}) for row in rows]
         if "orientation" in given and not anisotropic & (given | frozenset().union(*kinds)):
             yield custom_error(
@@ -450,7 +456,7 @@ MaterialTable: Any = table_of(
         list[RowTable] | None,
         Field(
             None,
-            min_length=2,
+            min_length=1,
             max_length=200,
             description="the tables [[material.over_temperature]]: constants and expansion at rising temperatures; linear between, constant beyond",
         ),
