@@ -18,7 +18,10 @@ from stickslip.study.questions import ANALYSES
 HERE = Path(__file__).parent
 # page -> its heading and the tables of the study file on it; the empty name is the top of the file
 PAGES_OF_KEYS = {
-    "general": ("At the top, material, temperature, damping, reduction", ("", "material", "temperature", "damping", "reduction")),
+    "general": (
+        "At the top, material, temperature, damping, reduction",
+        ("", "material", "temperature", "damping", "reduction"),
+    ),
     "parts": ("Parts", ("part",)),
     "contacts": ("Contacts and joins", ("contact", "join")),
     "loads": ("Loads, rotation, operating range", ("load", "rotation", "operation")),
