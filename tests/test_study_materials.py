@@ -283,12 +283,15 @@ def test_a_heated_part_is_checked_and_has_its_mass(folder):
     assert "mass 0.0942 kg" in done.output
 
 
+WHOLE = STEEL + "young_modulus_pa = 2.1e11\npoisson_ratio = 0.3\n"
+
+
 def test_a_temperature_without_effect_is_doubted(folder):
     heat = "[temperature]\nuniform_c = 400.0\n[modes]\nnumber = 2\n"
-    (said,) = read_study(study(folder, STEEL, heat)).model().parts["blade"].warnings
+    (said,) = read_study(study(folder, WHOLE, heat)).model().parts["blade"].warnings
     assert said.startswith("part.blade: its temperature has no effect: the material has neither constants")
     assert part_of(folder, STEEL + ROWS, "uniform_c = 400.0").warnings == ()
-    assert part_of(folder, STEEL, "").warnings == ()
+    assert part_of(folder, WHOLE, "").warnings == ()
 
 
 def test_temperatures_of_calculix_results_are_the_static_ones(folder):
@@ -324,3 +327,24 @@ def test_one_row_over_temperature_is_told_alone(folder):
     assert str(told.value).endswith(
         "part.blade.material: has one row of over_temperature, at 20 °C. Give another row, or its constants in [material] itself."
     )
+
+
+def test_a_material_of_a_file_that_becomes_steel_is_doubted(tmp_path):
+    """An expansion alone had replaced the deck's titanium by steel, in silence."""
+    deck = "*NODE\n" + "".join(
+        f"{4 * k + i + 1}, {x}, {y}, {0.1 * k}\n"
+        for k in (0, 1)
+        for i, (x, y) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1)))
+    )
+    deck += "*ELEMENT, TYPE=C3D8, ELSET=E\n1, 1, 2, 3, 4, 5, 6, 7, 8\n*MATERIAL, NAME=T\n*ELASTIC\n1.1e11, 0.3\n*DENSITY\n4400.\n"
+    deck += "*SOLID SECTION, ELSET=E, MATERIAL=T\n*NSET, NSET=ROOT\n1, 2, 3, 4\n*BOUNDARY\nROOT, 1, 3\n"
+    (tmp_path / "d.inp").write_text(deck)
+    path = tmp_path / "s.toml"
+    head = 'schema_version = 2\n[modes]\nnumber = 2\n[part.b]\nfile = "d.inp"\nunits = "SI"\nsectors = 1\n[part.b.material]\n'
+    path.write_text(head + "expansion_per_k = 9e-6\n")
+    (said,) = read_study(path).model().parts["b"].warnings
+    assert said.startswith(
+        "part.b: its material replaces that of the file, and density_kg_per_m3, young_modulus_pa, poisson_ratio,"
+    )
+    path.write_text(head + "young_modulus_pa = 1e11\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 4400.0\n")
+    assert read_study(path).model().parts["b"].warnings == ()

@@ -3,7 +3,7 @@
 import json
 import logging
 from collections.abc import Callable, MutableMapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -206,7 +206,26 @@ class Workshop:
         LOG.info("reading %s", table.file)
         others = self.others(table)
         heat = table.temperature or self.tables.temperature
-        return file_part(f"part.{name}", table, self.home, self.material(table), heat=heat, **others)
+        part = file_part(f"part.{name}", table, self.home, self.material(table), heat=heat, **others)
+        return replace(part, warnings=(*part.warnings, *self._steel_by_default(name, table)))
+
+    def _steel_by_default(self, name: str, table: FileModel) -> tuple[str, ...]:
+        """Return a warning if a material replaces that of a file and leaves out constants, as one with an expansion alone."""
+        given = table.material or self.tables.material
+        if given is None:
+            return ()
+        keys = given.model_fields_set.union(*(row.model_fields_set for row in given.over_temperature or []))
+        elastic = {"shear_modulus_pa", "young_moduli_pa", "elasticity_pa"} & keys
+        wanted = ["density_kg_per_m3", *([] if elastic else ["young_modulus_pa", "poisson_ratio"])]
+        missing = [key for key in wanted if key not in keys]
+        if not missing:
+            return ()
+        return (
+            (
+                f"part.{name}: its material replaces that of the file, and {', '.join(missing)}, left out, are those of steel. "
+                "Give all constants."
+            ),
+        )
 
 
 _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
