@@ -320,6 +320,15 @@ def test_temperatures_beyond_the_table_and_radii_in_mm_are_doubted(folder):
     assert said.startswith("part.blade: its temperatures reach 1500 °C, and its constants are those from 20 to ")
 
 
+def test_a_strain_that_no_metal_has_is_doubted_and_a_node_has_one_temperature(folder):
+    steel = STEEL + "expansion_per_k = 1e-3\n"
+    (said,) = part_of(folder, steel, "uniform_c = 420.0").warnings
+    assert said.startswith("part.blade: its thermal strain reaches 40 %, beyond that of metals.")
+    (folder / "t.csv").write_text("node,temperature_c\n1,20\n2,30\n2,40\n")
+    with pytest.raises(InputError, match="has two temperatures of node 2"):
+        part_of(folder, STEEL + ROWS, 'file = "t.csv"')
+
+
 def test_one_row_over_temperature_is_told_alone(folder):
     row = ROWS[: ROWS.rindex("[[")]
     with pytest.raises(InputError) as told:

@@ -17,6 +17,7 @@ from stickslip.study.file.model.material import FileTemperature, TemperatureTabl
 
 STRESS_FREE_C = 20.0
 BEYOND = 0.05  # of a table's range: by so much temperatures may leave it without a word, as 20 °C a table from 25 °C
+MAX_STRAIN = 0.05  # thermal strain beyond that of metals: nickel at its melting point has 0.03
 FAR = 10.0  # radii so many times those of the part are in another unit
 
 
@@ -123,6 +124,14 @@ def doubts_of_temperature(
                 f"{place}: its temperatures reach {reached:.4g} °C, and its constants are those from {low:g} to {high:g} °C; beyond, the "
                 "last row holds. Give rows that reach further."
             )
+    kinds = [one for one in dict.fromkeys(own) if isinstance(one, ElasticMaterial) and one.expansion is not None]
+    strains = [one.expansion.strain(found.start[used], found.values[used]) for one in kinds if one.expansion]
+    largest = max((float(np.abs(strain).max()) for strain in strains), default=0.0)
+    if largest > MAX_STRAIN:
+        said.append(
+            f"{place}: its thermal strain reaches {100 * largest:.3g} %, beyond that of metals. Check temperatures in °C and the "
+            "expansion in 1/K."
+        )
     return tuple(said)
 
 
@@ -160,6 +169,13 @@ def _by_node(path: Path, mesh: SolidMesh) -> FloatArray:
         columns = csv_columns(path, ("node", "temperature_c"))
         numbers, values = (csv_numbers(path, name, columns[name]) for name in ("node", "temperature_c"))
     order = np.argsort(numbers, kind="stable")
+    twice = np.flatnonzero(np.diff(numbers[order]) == 0)
+    if twice.size:
+        raise input_error(
+            str(path),
+            f"has two temperatures of node {numbers[order[twice[0]]]:.0f}",
+            "Give one of each node.",
+        )
     at = np.minimum(np.searchsorted(numbers, mesh.numbers, sorter=order), len(numbers) - 1)
     found = np.where(numbers[order[at]] == mesh.numbers, values[order[at]], np.nan)
     used = np.isin(np.arange(len(mesh.points)), mesh.cells)
