@@ -321,7 +321,7 @@ def test_temperatures_beyond_the_table_and_radii_in_mm_are_doubted(folder):
 
 
 def test_a_strain_that_no_metal_has_is_doubted_and_a_node_has_one_temperature(folder):
-    steel = STEEL + "expansion_per_k = 1e-3\n"
+    steel = STEEL + "young_modulus_pa = 2.1e11\npoisson_ratio = 0.3\nexpansion_per_k = 1e-3\n"
     (said,) = part_of(folder, steel, "uniform_c = 420.0").warnings
     assert said.startswith("part.blade: its thermal strain reaches 40 %, beyond that of metals.")
     (folder / "t.csv").write_text("node,temperature_c\n1,20\n2,30\n2,40\n")
