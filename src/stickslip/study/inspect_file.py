@@ -8,8 +8,9 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.model.facts import facts_of_solid
 from stickslip.model.fe.cell_laws import cell_laws
+from stickslip.model.readers.ansys_archive import read_ansys_archive
 from stickslip.model.readers.calculix_deck import Deck
-from stickslip.model.readers.open_model import model_summary, read_model
+from stickslip.model.readers.open_model import Model, model_summary, read_model
 from stickslip.model.readers.units import Units
 from stickslip.study.store.progress import LOG
 
@@ -47,7 +48,10 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[
     LOG.info(f"reading {path} in {system.name}")
     # doubtful numbers are shown with a remark, not refused, since users inspect a file to find them
     try:
-        model = read_model(path, units=system, mesh=mesh, plausible=False)
+        if Path(path).suffix.lower() == ".cdb":  # equations, which a study reads, do not keep from looking at the mesh
+            model: Model = read_ansys_archive(path, units=system, linked=True)
+        else:
+            model = read_model(path, units=system, mesh=mesh, plausible=False)
     except InputError as error:
         raise error.called(_OPTIONS) from None
     found = model_summary(model, n_modes=modes, units=system, say=LOG.info)

@@ -247,7 +247,7 @@ _READERS: dict[str, Callable[[_Files], Model]] = {
     ".frd": lambda f: read_frd(f.path, units=f.units),
     ".full": lambda f: read_ansys_full(f.path, nodes=f.nodes or f.mesh, units=f.units, plausible=f.plausible),
     ".rst": lambda f: read_ansys_results(f.path, units=f.units),
-    ".cdb": lambda f: read_ansys_archive(f.path, units=f.units, linked=True),
+    ".cdb": lambda f: read_ansys_archive(f.path, units=f.units),
     ".op2": lambda f: read_nastran_op2(f.path, units=f.units),
     ".mtx": _mtx,
     ".npz": _npz,
