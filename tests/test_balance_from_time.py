@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from evidence.trust.trial import outcome
 from stickslip.response.time.settling import Progress
 
 STIFFNESS, LIMIT, FORCE = 1e5, 1.0, 0.3
@@ -77,3 +78,11 @@ def test_an_integration_ends_where_the_motion_rings_on(factor: float, least: int
             break
     assert now.periods == (ends or 200)
     assert now.status == "unsettled"
+
+
+@pytest.mark.validation
+def test_beside_a_fold_shorter_steps_confirm_what_a_motion_attains() -> None:
+    """With 1024 steps a period it stayed for ever, with 2048 and 4096 it left: the peak was called stable."""
+    found = outcome(190001, 5)
+    assert not [j for j in found.judged if j.stability in ("stable", "carried") and j.multiplier > 1.001]
+    assert found.peak_stability == "stable"

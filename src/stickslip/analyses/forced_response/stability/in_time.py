@@ -245,13 +245,26 @@ def check_in_time(
     known = _driven(question, _known(found)[:, response.output])
     balances = [_of_balance(question, response, point)]
     if not (abs(check.difference_percent) <= LARGE and _apart(balances[0], known) <= APART):
-        order = min(max(MORE * point.order, LEAST_HARMONICS), MOST_HARMONICS)
-        check = replace(check, refined_order=max(order, point.order + 1))
-        better = refined(question, point, check.refined_order)
+        order = max(min(max(MORE * point.order, LEAST_HARMONICS), MOST_HARMONICS), point.order + 1)
+        check = replace(check, refined_order=order)
+        better = refined(question, point, order)
         if better is not None:
             balances.append(_of_balance(question, response, better))
             check = replace(check, refined=_amplitude(question, response, better))
-    motion = _motion(check, found, min(_apart(one, known) for one in balances))
+
+    def motion_of(one: Check, motion: TransientResult) -> Motion:
+        there = _driven(question, _known(motion)[:, response.output])
+        return _motion(one, motion, min(_apart(balance, there) for balance in balances))
+
+    motion = motion_of(check, found)
+    if motion == "attained" and multiplier is not None and isfinite(multiplier) and after > PATIENCE:
+        # beside a fold the error of the steps may decide on which side a motion lies
+        steps = 2 * check.steps
+        finer = integrated(question.problem, point, question.model.load, kick=KICK, least=PATIENCE, steps=steps)
+        fine = _compared(question, response, point, finer, steps)
+        if motion_of(fine, finer) != motion:
+            check = replace(fine, refined_order=check.refined_order, refined=check.refined)
+            motion = motion_of(fine, finer)
     return replace(check, motion=motion, shows_after=after), None
 
 
