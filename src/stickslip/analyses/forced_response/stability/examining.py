@@ -189,13 +189,16 @@ class _Search:
     def _opposed(self, place: int) -> bool:
         """Whether the determinant differs in sign from the nearest stable point of the branch, and examined neighbours with this sign are unstable.
 
-        Neighbours with more harmonics do not count: the fold of a point with fewer lies elsewhere.
+        Undecided neighbours do not contradict it. Neighbours with more harmonics do not count: the fold of a point with fewer lies
+        elsewhere. Stable ones beside a fold do not, either: more harmonics may have led to the motion on its other side.
         """
-        sign, stretch = self.course.sign, self._stretches
+        sign, stretch, fold = self.course.sign, self._stretches, self.course.fold
         others = [k for k in self._of_run(place) if k != place]
         alike = (k for k in others if stretch[k] == stretch[place] and self._order(k) <= self._order(place))
-        stable = [k for k in others if self.found[k].verdict == "stable"]
-        if {self.found[k].verdict for k in alike} != {"unstable"} or not stable:
+        far = [k for k in others if not np.any(fold[max(k - 1, 0) : k + 1])]
+        verdicts = {self.found[k].verdict for k in alike if k in far or self.found[k].verdict != "stable"}
+        stable = [k for k in far if self.found[k].verdict == "stable"]
+        if "unstable" not in verdicts or not verdicts <= {"unstable", "undecided"} or not stable:
             return False
         return bool(sign[min(stable, key=lambda k: abs(k - place))] * sign[place] < 0.0)
 
