@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from html import unescape
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -246,6 +247,18 @@ def test_paper_has_the_answer_before_a_long_list_of_verdicts(browser: Browser, l
     assert browser.run(where) == before
 
 
+def first_screen_of(browser: Browser, page: Path) -> dict[str, Any]:
+    """Check the order and the words of the first screen at 760 px, and return what stands there."""
+    browser.width(760)
+    browser.open(page)
+    browser.until("document.querySelector('figure .nsewdrag')")
+    first: dict[str, Any] = browser.run(FIRST)
+    assert first["verdict"] < first["answer"] < first["figure"] < 900
+    assert first["wide"] >= 480
+    assert 20 < first["words"] <= 90, first["all"]
+    return first
+
+
 @needs_browser
 @pytest.mark.parametrize("ratios", [(50, 20, 5), (5,)])
 def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
@@ -253,13 +266,7 @@ def test_the_first_screen_holds_verdict_answer_and_figure_in_few_words(
 ) -> None:
     page = tmp_path / "report.html"
     page.write_text(html_of(light(synthetic_result(ratios=ratios))), encoding="utf-8")
-    browser.width(760)
-    browser.open(page)
-    browser.until("document.querySelector('figure .nsewdrag')")
-    first = browser.run(FIRST)
-    assert first["verdict"] < first["answer"] < first["figure"] < 900
-    assert first["wide"] >= 480
-    assert 20 < first["words"] <= 90, first["all"]
+    first_screen_of(browser, page)
 
 
 @needs_browser
@@ -272,13 +279,7 @@ def test_the_first_screen_of_a_comparison_holds_verdict_answer_and_figure(
     ]
     page = tmp_path / "both.html"
     ss.compare(*results, names=("before", "after")).report(page)
-    browser.width(760)
-    browser.open(page)
-    browser.until("document.querySelector('figure .nsewdrag')")
-    first = browser.run(FIRST)
-    assert first["verdict"] < first["answer"] < first["figure"] < 900
-    assert first["wide"] >= 480
-    assert 20 < first["words"] <= 90, first["all"]
+    first = first_screen_of(browser, page)
     assert "peak, equal to" in first["all"]
 
 

@@ -10,13 +10,17 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
+from evidence.validation.calculix import frequencies_hz
+from evidence.validation.compare import Record, record
 from evidence.validation.reference_data import folder
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.model.axis import Axis
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic import cyclic_sector
 
 SECTORS = 24
 DECKS = {"coarse": "n24_coarse_cyc_pre.inp", "medium": "n24_medium_prestressed.inp"}
@@ -87,6 +91,20 @@ def lowest_frequencies(structure: Structure, tie: Matrix, n: int) -> FloatArray:
     inverse = scipy.sparse.linalg.LinearOperator(K.shape, matvec=factorise(K), dtype=K.dtype)
     squares = scipy.sparse.linalg.eigsh(K, n, M=M, sigma=0, OPinv=inverse, return_eigenvectors=False)
     return np.asarray(np.sqrt(np.sort(squares)) / (2 * np.pi))
+
+
+def waves_compared(
+    case: str, where: str, structure: Structure, axis: Axis, sectors: int, printed: str, digits: float, source: str
+) -> list[Record]:
+    """Compare the frequencies of each nodal diameter in the output of CalculiX; the worst mode of each is recorded."""
+    sector = cyclic_sector(structure, sectors, axis=axis)
+    records = []
+    for diameter, theirs in frequencies_hz(printed).items():
+        ours = lowest_frequencies(structure, sector.wave_tie(diameter), len(theirs))
+        worst = int(np.argmax(np.abs(ours / theirs - 1)))
+        quantity = f"{where}nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
+        records.append(record(case, quantity, ours[worst], theirs[worst], digits, source))
+    return records
 
 
 def static_difference(sector: StoredSector, tie: Matrix) -> float:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from evidence.models.annulus import annular_sector
-from evidence.validation.calculix import MISSING, available, displacements, frequencies_hz, run_deck
-from evidence.validation.calculix_stored import lowest_frequencies
-from evidence.validation.compare import Record, bound, left_out, record
+from evidence.validation.calculix import MISSING, available, displacements, run_deck
+from evidence.validation.calculix_stored import waves_compared
+from evidence.validation.compare import Record, bound, left_out
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.material import Material
 from stickslip.model.fe.rotation import rotating_solid
@@ -92,10 +92,5 @@ def compared(case: str, given: tuple[int, str, str, str]) -> list[Record]:
     records = [bound(case, "static displacement at speed: largest difference over its largest", off, DIGITS, SOURCE)]
     states = [solid.structure, solid.at_speed(deck.speed, tie=tie)]
     for (where, text), structure in zip(printed.items(), states, strict=True):
-        sector = cyclic_sector(structure, SECTORS, axis=deck.axis)
-        for diameter, reference in frequencies_hz(text).items():
-            found = lowest_frequencies(structure, sector.wave_tie(diameter), len(reference))
-            worst = int(np.argmax(np.abs(found / reference - 1)))
-            quantity = f"{where}, nodal diameter {diameter}, mode {worst + 1} (the worst of {len(reference)}), Hz"
-            records.append(record(case, quantity, found[worst], reference[worst], DIGITS, SOURCE))
+        records += waves_compared(case, f"{where}, ", structure, deck.axis, SECTORS, text, DIGITS, SOURCE)
     return records

@@ -11,8 +11,8 @@ import numpy as np
 import scipy.linalg
 
 from evidence.models.annulus import annular_sector
-from evidence.validation.calculix import MISSING, available, frequencies_hz, run_deck
-from evidence.validation.calculix_stored import lowest_frequencies
+from evidence.validation.calculix import MISSING, available, run_deck
+from evidence.validation.calculix_stored import waves_compared
 from evidence.validation.case_calculix_matrices_at_speed import frequencies
 from evidence.validation.compare import Record, left_out, record
 from stickslip.arrays import FloatArray
@@ -141,22 +141,15 @@ def sector_deck(path: Path, speed: float) -> None:
 def of_sector(path: Path, speed: float) -> list[Record]:
     """Compare the frequencies of a sector with equations, nodal diameter by nodal diameter."""
     sector_deck(path, speed)
-    printed = frequencies_hz(run_deck(path))
+    printed = run_deck(path)
     deck = read_deck(path)
     solid = rotating_solid(deck.mesh, deck.material, deck.axis, quadrature=deck.quadrature, links=deck.links)
     tie = cyclic_sector(solid.structure, SECTORS, axis=deck.axis).tie
     state = solid.at_speed(speed, tie=tie) if speed else solid.structure
-    sector = cyclic_sector(state, SECTORS, axis=deck.axis)
     case = (
         f"a sector with equations at {speed:g} rad/s" if speed else "a sector with equations and a rigid tip, at rest"
     )
-    records = []
-    for diameter, theirs in printed.items():
-        ours = lowest_frequencies(state, sector.wave_tie(diameter), len(theirs))
-        worst = int(np.argmax(np.abs(ours / theirs - 1)))
-        quantity = f"nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
-        records.append(record(case, quantity, ours[worst], theirs[worst], DIGITS, SOURCE))
-    return records
+    return waves_compared(case, "", state, deck.axis, SECTORS, printed, DIGITS, SOURCE)
 
 
 def run() -> list[Record]:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from evidence.validation.calculix import MISSING, available, displacements, frequencies_hz, run_deck
-from evidence.validation.calculix_stored import DECKS, lowest_frequencies
-from evidence.validation.compare import Record, bound, left_out, record
+from evidence.validation.calculix import MISSING, available, displacements, run_deck
+from evidence.validation.calculix_stored import DECKS, waves_compared
+from evidence.validation.compare import Record, bound, left_out
 from evidence.validation.reference_data import COPIES
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
@@ -86,10 +86,5 @@ def run() -> list[Record]:
     )
     states = {"at rest": solid.structure, "at 8000 rpm": solid.at_speed(deck.speed, tie=tie)}
     for where, structure in states.items():
-        sector = cyclic_sector(structure, 24, axis=deck.axis)
-        for diameter, theirs in frequencies_hz(printed[where]).items():
-            ours = lowest_frequencies(structure, sector.wave_tie(diameter), len(theirs))
-            worst = int(np.argmax(np.abs(ours / theirs - 1)))
-            quantity = f"{where}, nodal diameter {diameter}, mode {worst + 1} (the worst of {len(theirs)}), Hz"
-            records.append(record(CASE, quantity, ours[worst], theirs[worst], DIGITS, SOURCE))
+        records += waves_compared(CASE, f"{where}, ", structure, deck.axis, 24, printed[where], DIGITS, SOURCE)
     return records

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from evidence.models.annulus import annular_sector
-from evidence.validation.calculix import MISSING, available, displacements, frequencies_hz, run_deck
-from evidence.validation.calculix_stored import lowest_frequencies
-from evidence.validation.compare import Record, bound, left_out, record
+from evidence.validation.calculix import MISSING, available, displacements, run_deck
+from evidence.validation.calculix_stored import waves_compared
+from evidence.validation.compare import Record, bound, left_out
 from stickslip.arrays import FloatArray
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.material import Material
@@ -102,10 +102,4 @@ def compared(case: str, given: tuple[int, str, str, float]) -> list[Record]:
     off = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
     records = [bound(case, "static displacement: largest difference over its largest", off, DIGITS, SOURCE)]
     turning = solid.at_speed(deck.speed, tie=tie)
-    sector = cyclic_sector(turning, SECTORS, axis=deck.axis)
-    for diameter, reference in frequencies_hz(printed).items():
-        found = lowest_frequencies(turning, sector.wave_tie(diameter), len(reference))
-        worst = int(np.argmax(np.abs(found / reference - 1)))
-        quantity = f"nodal diameter {diameter}, mode {worst + 1} (the worst of {len(reference)}), Hz"
-        records.append(record(case, quantity, found[worst], reference[worst], DIGITS, SOURCE))
-    return records
+    return [*records, *waves_compared(case, "", turning, deck.axis, SECTORS, printed, DIGITS, SOURCE)]

@@ -549,7 +549,8 @@ def _concluded(designs: Sequence[Design]) -> Conclusion:
 def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] = ()) -> str:
     """Return the page of a comparison; an `InputError` if curves cannot be compared with the designs.
 
-    The page begins with the verdicts, the answer and its figure: the optimisation curves, else the responses.
+    The page begins with the verdicts, the answer and its figure. The figure shows the optimisation curves, or the responses where
+    there are none.
     """
     placing, divided = Placing(), per_force(designs, curves)
     each = {key: (title, list(own)) for key, title, own in contents(designs, curves) if key != "verdicts"}

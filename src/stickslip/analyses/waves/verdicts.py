@@ -132,7 +132,7 @@ def campbell_doubts(
 
 
 def in_operation(found: Campbell) -> Iterator[Verdict]:
-    """Note the crossings within the operating speeds, else the margin of the nearest one; doubt speeds outside the diagram."""
+    """Note the crossings within the operating speeds, or the margin of the nearest one; doubt speeds outside the diagram."""
     own, rpm = found.operating, found.speeds_rpm
     if not own.known:
         return

@@ -245,14 +245,10 @@ def _from_deck(
     deck = read_deck(path, units=_units(table), plausible=table.plausible)
     sectors = _sectors(key, table, deck.sectors)
     if deck.sectors is None and sectors > 1 and table.cyclic == "node_to_node":
-        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.numbers, deck.mesh.node_sets)
-        low, high = (sets[name] for name in _faces(key, table, sets, sectors))
-        deck = held_like_partners(deck, (low, high), table.axis() or deck.axis, sectors)
+        deck = held_like_partners(deck, _face_nodes(key, table, deck.mesh, sectors), table.axis() or deck.axis, sectors)
     links = deck.links
     if links is not None and sectors > 1 and deck.sectors is None:
-        sets = with_sets(key, table.sets, deck.mesh.points, deck.mesh.numbers, deck.mesh.node_sets)
-        faces = [sets[name] for name in _faces(key, table, sets, sectors)]
-        links = replace(links, lasting=np.concatenate(faces))
+        links = replace(links, lasting=np.concatenate(_face_nodes(key, table, deck.mesh, sectors)))
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
     part = _solid(
         key,
@@ -282,6 +278,13 @@ def _from_deck(
     return replace(part, warnings=(*part.warnings, *said))
 
 
+def _face_nodes(key: str, table: FileModel, mesh: SolidMesh, sectors: int) -> tuple[IntArray, IntArray]:
+    """Return the nodes of the two cyclic faces that a study names."""
+    sets = with_sets(key, table.sets, mesh.points, mesh.numbers, mesh.node_sets)
+    low, high = (sets[name] for name in _faces(key, table, sets, sectors))
+    return low, high
+
+
 def _materials(deck: Deck) -> Materials:
     if len(set(deck.cell_material)) > 1:
         return [deck.materials[name] for name in deck.cell_material]
@@ -305,8 +308,7 @@ def _from_archive(
     mesh = _cyclic_pairs(key, mesh, sectors, table.axis() or Axis())
     links = read_ansys_links(path, mesh, cyclic=sectors > 1)
     if links is not None and sectors > 1:
-        sets = with_sets(key, table.sets, mesh.points, mesh.numbers, mesh.node_sets)
-        links = replace(links, lasting=np.concatenate([sets[name] for name in _faces(key, table, sets, sectors)]))
+        links = replace(links, lasting=np.concatenate(_face_nodes(key, table, mesh, sectors)))
     quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
     return _solid(
         key,
