@@ -28,7 +28,6 @@ REASONS = {
     "api.reading": "read by the command line before anything that computes",
     "assembly.extent": "slip and strain against the size of the parts: one rule",
     "contact.steps.element": "one step a file, compiled when its law is first used",
-    "model.readers.ansys_shapes": "the shapes that a brick with repeated nodes may have",
     "model.fe.hourglass": "when bricks with one point are doubtful: needs modes, which the solid does not",
     "model.fe.free_solid": "rigid motions of a free solid, and the rank decision",
     "study.check": "the command check",

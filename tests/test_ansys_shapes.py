@@ -12,8 +12,7 @@ from stickslip.errors import InputError
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh, by_kind
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.readers.ansys_archive import read_ansys_archive
-from stickslip.model.readers.ansys_shapes import regular_nodes
+from stickslip.model.readers.ansys_archive import read_ansys_archive, regular_nodes
 
 STEEL = Material(young_modulus=210e9, poisson_ratio=0.3, density=7850.0)
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)

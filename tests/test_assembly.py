@@ -24,7 +24,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.part import damper_part, solid_part, structure_part
-from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.rigid.dampers import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Dofs, Structure, join
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton

@@ -14,9 +14,7 @@ from stickslip import Study
 from stickslip.assembly import copy_of, place_of
 from stickslip.errors import InputError
 from stickslip.model.part import damper_part
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
-from stickslip.model.rigid.sides import nearest
+from stickslip.model.rigid.dampers import CylinderDamper, FlatCurvedDamper, WedgeDamper, nearest
 
 DEG = math.pi / 180
 LENGTH, WIDTH = 0.048, 0.027

@@ -12,7 +12,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import chain, lumped
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.modes import natural_frequencies, with_springs
-from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.rigid.dampers import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.fixed_interface import craig_bampton
 

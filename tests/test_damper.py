@@ -9,7 +9,7 @@ from small_v2 import write_two_blades
 from stickslip.assembly.assembling import assemble
 from stickslip.errors import InputError
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.rigid.dampers import FlatCurvedDamper, gap_operator
 from stickslip.study.models.study import read_study
 
 

@@ -19,10 +19,9 @@ from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.cell_matrices import hourglass_stiffness
-from stickslip.model.fe.elements import EXACT, Quadrature, cell_groups
+from stickslip.model.fe.elements import EXACT, OWN_SHAPES, Quadrature, cell_groups, own_rule, own_shape_functions
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.fe.wedges import OWN_SHAPES, own_rule, own_shape_functions
 from stickslip.model.mesh.solid_mesh import SolidMesh, by_kind, facets_of, mirrored_cells
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix_deck import assemble_deck, read_deck

@@ -26,10 +26,17 @@ from stickslip.contact.surface import Surface, nodal_surface, rigid_surface, str
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import rayleigh_damping
-from stickslip.model.mesh.facets import DEGREE, KINDS, REFERENCE_NODES, positions, shape_functions, shape_gradients
-from stickslip.model.mesh.nearest_facets import closest
+from stickslip.model.mesh.facets import (
+    DEGREE,
+    KINDS,
+    REFERENCE_NODES,
+    closest,
+    positions,
+    shape_functions,
+    shape_gradients,
+)
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.rigid.dampers import FlatCurvedDamper, gap_operator
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System

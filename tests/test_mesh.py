@@ -11,7 +11,7 @@ import pytest
 from stickslip.errors import InputError, StickslipError
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.solid_mesh import write_mesh
-from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.dampers import FlatCurvedDamper
 
 COARSE = {"airfoil_size": 0.02, "platform_size": 0.012, "foot_size": 0.02}
 

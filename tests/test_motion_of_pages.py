@@ -14,10 +14,8 @@ from stickslip.analyses.page import report_html
 from stickslip.arrays import FloatArray
 from stickslip.assembly.part_copies import copy_of, placed_body
 from stickslip.model.part import BodyPoints, Damper, Place, damper_part, rigid_part
-from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper, section_moments
-from stickslip.model.rigid.solids import BodySolid
+from stickslip.model.rigid.body import BodySolid, RigidBody
+from stickslip.model.rigid.dampers import CylinderDamper, FlatCurvedDamper, WedgeDamper, section_moments
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: the page is not opened")
 WEDGE = WedgeDamper(left_angle=0.8, right_angle=0.6, top_width=0.004, height=0.012, length=0.04, mass=0.02)

@@ -30,8 +30,7 @@ from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.mesh.solid_mesh import by_kind
 from stickslip.model.readers.ansys_archive import ansys_passed_over
-from stickslip.model.readers.ansys_nodes import read_ansys_nodes, rotations
-from stickslip.model.readers.ansys_records import Records
+from stickslip.model.readers.ansys_binary import Records, read_ansys_nodes, rotations
 from stickslip.model.readers.units import Units
 
 INCH = Units.inch_lbf_s()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from stickslip import InputError, Material, Units
 from stickslip.model import assemble_deck, chain, natural_frequencies, read_deck
-from stickslip.model.readers.deck_words import PARAMETERS
+from stickslip.model.readers.keywords import PARAMETERS
 from stickslip.model.readers.units import check_material, doubt_about_units, in_si
 from stickslip.model.structure import Dofs, Structure
 

@@ -14,7 +14,7 @@ import scipy.sparse
 from stickslip import InputError, StickslipError
 from stickslip.model import read_nastran_dmig, read_nastran_op2, read_nastran_op4
 from stickslip.model.readers.nastran import op4_matrices
-from stickslip.model.readers.nastran_dofs import read_nastran_dofs
+from stickslip.model.readers.nastran_bulk import read_nastran_dofs
 from stickslip.model.readers.nastran_library import check_lines, check_records, reading
 from stickslip.model.readers.units import Units
 

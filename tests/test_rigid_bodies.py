@@ -14,8 +14,7 @@ from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.part import damper_part
 from stickslip.model.rigid.body import RigidBody, body_of_tensor
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
-from stickslip.model.rigid.sides import grow_within
+from stickslip.model.rigid.dampers import CylinderDamper, WedgeDamper, grow_within
 from stickslip.units import RPM
 
 DEG = math.pi / 180

@@ -16,9 +16,8 @@ from stickslip.errors import InputError, SingularError, StickslipError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.modes import natural_frequencies
+from stickslip.model.modes import gyroscopic_modes, natural_frequencies
 
 STEEL = Material(young_modulus=210e9, poisson_ratio=0.3, density=7850.0)
 BAR = Material(young_modulus=210e9, poisson_ratio=0.0, density=7850.0)

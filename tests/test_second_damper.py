@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evidence.second_damper.search import JUDGED, RATIOS, STUCK, AtPeak, Candidate, Found
-from stickslip.model.rigid.prisms import section_moments
+from stickslip.model.rigid.dampers import section_moments
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 OWN = Candidate(50.0, 78.0, (0.002, 0.025), 0.1)

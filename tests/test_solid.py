@@ -12,7 +12,7 @@ from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_pair import BladePair, mesh_blade_pair
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.dampers import FlatCurvedDamper
 
 STEEL = Material(young_modulus=210e9, poisson_ratio=0.3, density=7850.0)
 CUBE_TETS = [(0, 1, 3, 7), (0, 5, 1, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 4, 5, 7), (0, 6, 4, 7)]

@@ -19,7 +19,7 @@ from stickslip.contact.laws.iwan import FourParameter, Iwan
 from stickslip.errors import InputError, input_error, together
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector, Shroud
-from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.dampers import FlatCurvedDamper
 from stickslip.study.analysis import named
 from stickslip.study.file.case_names import namings
 from stickslip.study.file.example import Kind, example_decks, example_text

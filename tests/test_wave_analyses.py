@@ -21,9 +21,8 @@ from stickslip.errors import InputError
 from stickslip.model.fe.cell_laws import cell_laws
 from stickslip.model.fe.prestress import strain_and_rotation
 from stickslip.model.fe.solid import Material
-from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.modes import normal_modes, with_springs
+from stickslip.model.modes import gyroscopic_modes, normal_modes, with_springs
 from stickslip.model.part import solid_part
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.structure_file import save_structure

@@ -5,8 +5,7 @@ import pytest
 import scipy.sparse
 
 from evidence.models.wheel_sector import sector
-from stickslip.model.fe.dissection import dissected
-from stickslip.model.fe.multifrontal import multifrontal
+from stickslip.model.fe.multifrontal import dissected, multifrontal
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.reduction import wave_family
 from stickslip.reduction.cyclic import travelling_wave

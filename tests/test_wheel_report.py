@@ -16,7 +16,7 @@ from stickslip.analyses.waves.page.campbell import campbell_diagram
 from stickslip.analyses.waves.page.safe import interference, safe_diagram, zigzag
 from stickslip.analyses.waves.page.waves import Waves, view_of
 from stickslip.analyses.waves.records import Campbell, Interference
-from stickslip.model.mesh.coarse import coarse_skin
+from stickslip.model.mesh.solid_mesh import coarse_skin
 
 TITLE = "A <flat> ring & nothing else"
 

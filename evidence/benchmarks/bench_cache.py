@@ -26,7 +26,7 @@ from stickslip.contact.laws import LAWS
 from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.matrices import chain
+from stickslip.model.structure import chain
 
 
 def step(displacement, velocity, state, parameters, force, new_state, jac, status):

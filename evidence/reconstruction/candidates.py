@@ -7,8 +7,7 @@ from itertools import product
 from typing import Any
 
 from evidence.models.two_blades import COARSER, TwoBlades, two_blades
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import section_moments
+from stickslip.model.rigid.dampers import FlatCurvedDamper, section_moments
 
 LENGTH = 0.04  # m: of the damper along its axis
 STEEL, TITANIUM = 7850.0, 4430.0  # kg/m^3

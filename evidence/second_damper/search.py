@@ -19,8 +19,7 @@ from evidence.models.two_blades import COARSER, SHIPPED, TwoBlades, two_blades
 from stickslip import forced_response
 from stickslip.contact.law import OPEN, SLIP
 from stickslip.errors import StickslipError
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import section_moments
+from stickslip.model.rigid.dampers import FlatCurvedDamper, section_moments
 from stickslip.response import accepted_points, forced_problem, signals
 from stickslip.units import HZ
 

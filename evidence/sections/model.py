@@ -7,7 +7,7 @@ from typing import Any
 from evidence.models.two_blades import RATIO, SHIPPED, TwoBlades
 from stickslip.analyses.forced_response.problem import question_of
 from stickslip.model.mesh.blade_pair import BladePair
-from stickslip.model.rigid.sides import middles
+from stickslip.model.rigid.dampers import middles
 from stickslip.study.file.quantities import build
 from stickslip.study.models.study import Study, read_study
 

@@ -38,7 +38,7 @@ from .model.mesh.sector import BladedSector as BladedSector
 from .model.part import Part as Part
 from .model.readers.open_model import read_model as read_model
 from .model.readers.units import Units as Units
-from .model.rigid.damper import FlatCurvedDamper as FlatCurvedDamper
+from .model.rigid.dampers import FlatCurvedDamper as FlatCurvedDamper
 from .model.structure import Structure as Structure
 from .reduction.fixed_interface import craig_bampton as craig_bampton
 from .response.equilibrium import preload as preload

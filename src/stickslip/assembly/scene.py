@@ -15,9 +15,9 @@ from stickslip.assembly.skin import mesh_motion
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.fe.solid import node_dofs
-from stickslip.model.mesh.coarse import coarse_skin
+from stickslip.model.mesh.solid_mesh import coarse_skin
 from stickslip.model.part import Part
-from stickslip.model.rigid.solids import prism
+from stickslip.model.rigid.body import prism
 from stickslip.response.system import System
 
 MOST_POINTS = 2_000  # of all meshes together

@@ -6,15 +6,20 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.surface import Surface
-from stickslip.model.mesh.facets import REFERENCE_NODES, centres, corner_counts, normals, positions, tangents
-from stickslip.model.mesh.nearest_facets import (
+from stickslip.model.mesh.facets import (
     CONVERGED,
     INSIDE,
     MAX_GAUSS_NEWTON,
     MAX_REFERENCE,
+    REFERENCE_NODES,
+    centres,
     closest,
+    corner_counts,
     near_pairs,
+    normals,
+    positions,
     solve_two,
+    tangents,
 )
 
 

@@ -20,11 +20,11 @@ from stickslip.model.mesh.facets import (
     REFERENCE_NODES,
     interpolation,
     kinds_of,
+    near_pairs,
     normals,
     positions,
     shape_functions,
 )
-from stickslip.model.mesh.nearest_facets import near_pairs
 
 # degree -> orbits (weight, barycentric coordinates); an orbit holds all permutations
 _ORBITS: dict[int, tuple[tuple[float, tuple[float, float, float]], ...]] = {

@@ -17,10 +17,8 @@ from stickslip.model.fe.material import Materials
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.matrices_at_speeds import SpeedMatrices
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
-from stickslip.model.rigid.solids import BodySolid, from_faces, prism
+from stickslip.model.rigid.body import BodySolid, RigidBody, from_faces, prism
+from stickslip.model.rigid.dampers import CylinderDamper, FlatCurvedDamper, WedgeDamper
 from stickslip.model.structure import Structure
 
 FACES = ("cyclic_low", "cyclic_high")

@@ -13,8 +13,7 @@ import numpy as np
 import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import normal_modes
+from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.model.structure import Structure, modal_dofs
 from stickslip.reduction.basis import in_coordinates, surviving_sets, with_modal_dofs
 from stickslip.reduction.choice import Reduction

@@ -17,8 +17,7 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import input_error
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import natural_frequencies, with_springs
+from stickslip.model.modes import gyroscopic_modes, natural_frequencies, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.contact_coordinates import own_motions

@@ -22,8 +22,7 @@ from stickslip.assembly.sides.waves import damping_by_modes
 from stickslip.assembly.statics import StaticState
 from stickslip.errors import input_error
 from stickslip.model.damping import Damping
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import normal_modes
+from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.wave_family import WaveFamily

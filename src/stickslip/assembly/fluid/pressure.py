@@ -11,8 +11,7 @@ from stickslip.assembly.locations import Places, Spot, with_rim
 from stickslip.contact.projection import facet_balls
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
-from stickslip.model.mesh.facets import centres, corner_counts, interpolation, normals, positions
-from stickslip.model.mesh.nearest_facets import closest
+from stickslip.model.mesh.facets import centres, closest, corner_counts, interpolation, normals, positions
 
 # largest distance of a field from a surface, relative to the surface's size: no flow solver's mesh is so far away
 FAR = 0.1

@@ -14,7 +14,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, StickslipError, input_error
 from stickslip.model.mesh.gmsh_session import gmsh_session, quadratic_tetrahedra
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.rigid.sides import ContactPoints
+from stickslip.model.rigid.dampers import ContactPoints
 from stickslip.units import angle, check_quantities, length, quantity
 
 

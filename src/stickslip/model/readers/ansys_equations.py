@@ -10,8 +10,8 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.fe.links import Links
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.readers.ansys_binary import read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_blocks import Blocks, is_whole, read_blocks
-from stickslip.model.readers.ansys_nodes import read_ansys_nodes, rotations
 
 LABELS = {"UX": 0, "UY": 1, "UZ": 2}
 LEAVE_OUT = "Delete it (CEDELE, CPDELE), or let ANSYS write its matrices (read_ansys_full)."

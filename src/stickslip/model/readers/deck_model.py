@@ -20,7 +20,7 @@ from stickslip.model.readers.deck_links import (
     read_transform,
 )
 from stickslip.model.readers.deck_materials import Constants, DeckHeat, read_constants, read_expansion
-from stickslip.model.readers.deck_words import (
+from stickslip.model.readers.keywords import (
     ABAQUS_WORDS,
     DAMPING,
     PARAMETERS,
@@ -28,8 +28,12 @@ from stickslip.model.readers.deck_words import (
     REFUSED,
     SILENT,
     TOLD,
+    Block,
+    members,
+    real_number,
+    unique_in_order,
+    whole_number,
 )
-from stickslip.model.readers.keywords import Block, members, real_number, unique_in_order, whole_number
 from stickslip.model.readers.node_table import NodeTable
 
 NODES_OF = {

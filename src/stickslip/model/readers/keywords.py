@@ -1,4 +1,8 @@
-"""Keyword files (CalculiX, Abaqus): blocks of a ``*KEYWORD, PARAMETER=VALUE`` line and its data lines."""
+"""Keyword files (CalculiX, Abaqus): blocks of a ``*KEYWORD, PARAMETER=VALUE`` line and its data lines.
+
+A keyword or parameter is read, ignored or reported; any other is refused by line: it may change mass, stiffness, supports, damping or
+rotation.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -9,8 +13,218 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
-from stickslip.model.readers.deck_words import PARAMETERS
 from stickslip.model.readers.text import SHOWN, number_table, read_text
+
+# Parameters of the keywords that are read. The second row has harmless parameters: names, outputs, tolerances of a tie that is
+# made anew here, amplitudes of a zero displacement, thicknesses of shells, options of rate-dependent materials.
+PARAMETERS: dict[str, frozenset[str]] = {
+    keyword: frozenset([*read, *harmless])
+    for keyword, read, harmless in (
+        ("INCLUDE", ["INPUT"], []),
+        ("NODE", ["NSET", "INPUT", "SYSTEM"], []),
+        ("ELEMENT", ["TYPE", "ELSET", "INPUT"], []),
+        ("NSET", ["NSET", "ELSET", "GENERATE", "INPUT"], ["INSTANCE", "INTERNAL", "UNSORTED"]),
+        ("ELSET", ["ELSET", "GENERATE", "INPUT"], ["INSTANCE", "INTERNAL", "UNSORTED"]),
+        ("SURFACE", ["NAME", "TYPE", "INPUT"], ["INTERNAL", "INSTANCE", "TRIM", "NO OFFSET", "NO THICK", "MAX RATIO"]),
+        ("MATERIAL", ["NAME"], ["RTOL", "SRATE FACTOR", "SRATE TYPE"]),
+        ("ELASTIC", ["TYPE", "INPUT"], ["MODULI"]),
+        ("DENSITY", ["INPUT"], []),
+        ("SOLID SECTION", ["ELSET", "MATERIAL", "ORIENTATION"], ["CONTROLS", "NODAL THICKNESS"]),
+        ("EXPANSION", ["TYPE", "ZERO", "INPUT"], []),
+        ("TEMPERATURE", ["OP", "AMPLITUDE", "INPUT"], ["TIME DELAY"]),
+        ("ORIENTATION", ["NAME", "SYSTEM", "DEFINITION", "INPUT"], []),
+        ("BOUNDARY", ["OP", "TYPE", "INPUT"], ["AMPLITUDE", "TIME DELAY", "LOAD CASE", "FIXED"]),
+        ("DLOAD", ["OP", "AMPLITUDE", "INPUT"], ["TIME DELAY", "LOAD CASE"]),
+        (
+            "STEP",
+            ["NLGEOM"],
+            ["NAME", "PERTURBATION", "INC", "INCF", "AMPLITUDE", "EXTRAPOLATION", "SOLVER", "UNSYMM", "CONVERT SDI"],
+        ),
+        ("TIE", ["CYCLIC SYMMETRY", "POSITION TOLERANCE"], ["NAME", "ADJUST", "TYPE", "NO ROTATION", "NO THICKNESS"]),
+        ("CYCLIC SYMMETRY MODEL", ["N", "ELSET", "INPUT"], ["NGRAPH", "TIE", "CHECK"]),
+        ("EQUATION", ["INPUT"], []),
+        ("MPC", [], []),
+        ("TRANSFORM", ["NSET", "TYPE"], []),
+        ("RIGID BODY", ["NSET", "PIN NSET", "ELSET", "REF NODE", "REFNODE", "ROT NODE", "ROTNODE"], ["POSITION"]),
+        ("COUPLING", ["REF NODE", "REFNODE", "SURFACE"], ["CONSTRAINT NAME"]),
+        ("KINEMATIC", [], []),
+        ("DISTRIBUTING", [], []),
+        ("MASS", ["ELSET"], []),
+        ("SPRING", ["ELSET"], ["RTOL"]),
+        ("DASHPOT", ["ELSET"], ["RTOL"]),
+        ("INSTANCE", ["NAME", "PART"], []),
+        ("INITIAL CONDITIONS", ["TYPE"], ["INPUT", "USER", "FILE", "STEP", "INC", "INSTANCE"]),
+    )
+}
+
+# Keywords that are skipped, as they do not affect mass, stiffness, supports or damping: names, procedures, output, and
+# properties of contacts and shells (contacts and shells themselves are refused)
+SILENT = frozenset(
+    {
+        "HEADING",
+        "PREPRINT",
+        "PART",
+        "END PART",
+        "ASSEMBLY",
+        "END ASSEMBLY",
+        "END INSTANCE",
+        "PARAMETER",
+        "PHYSICAL CONSTANTS",
+        "END STEP",
+        "STATIC",
+        "FREQUENCY",
+        "COMPLEX FREQUENCY",
+        "BUCKLE",
+        "STEADY STATE DYNAMICS",
+        "MODAL DYNAMIC",
+        "DYNAMIC",
+        "VISCO",
+        "HEAT TRANSFER",
+        "COUPLED TEMPERATURE-DISPLACEMENT",
+        "UNCOUPLED TEMPERATURE-DISPLACEMENT",
+        "GREEN",
+        "SELECT CYCLIC SYMMETRY MODES",
+        "SELECT EIGENMODES",
+        "NO ANALYSIS",
+        "CONTROLS",
+        "SOLUTION TECHNIQUE",
+        "DIAGNOSTICS",
+        "NODE PRINT",
+        "NODE FILE",
+        "NODE OUTPUT",
+        "EL PRINT",
+        "EL FILE",
+        "ELEMENT OUTPUT",
+        "ENERGY OUTPUT",
+        "ENERGY PRINT",
+        "ENERGY FILE",
+        "MODAL OUTPUT",
+        "MODAL FILE",
+        "MODAL PRINT",
+        "CONTACT FILE",
+        "CONTACT PRINT",
+        "CONTACT OUTPUT",
+        "SECTION PRINT",
+        "SECTION FILE",
+        "INTEGRATED OUTPUT",
+        "INTEGRATED OUTPUT SECTION",
+        "OUTPUT",
+        "USER OUTPUT",
+        "PRINT",
+        "RESTART",
+        "MONITOR",
+        "DESIGNVARIABLES",
+        "DESIGN VARIABLES",
+        "DESIGN RESPONSE",
+        "OBJECTIVE",
+        "CONSTRAINT",
+        "SENSITIVITY",
+        "FEASIBLE DIRECTION",
+        "GEOMETRIC CONSTRAINT",
+        "FILE FORMAT",
+        "FILTER",
+        "TIME POINTS",
+        "AMPLITUDE",
+        "MATRIX GENERATE",
+        "MATRIX OUTPUT",
+        "SUBSTRUCTURE GENERATE",
+        "SUBSTRUCTURE MATRIX OUTPUT",
+        "RETAINED NODAL DOFS",
+        "COORDINATE SYSTEM",
+        "SURFACE INTERACTION",
+        "SURFACE BEHAVIOR",
+        "FRICTION",
+        "CONTACT DAMPING",
+        "GAP CONDUCTANCE",
+        "GAP HEAT GENERATION",
+        "NODAL THICKNESS",
+        "NORMAL",
+        "SECTION CONTROLS",
+        "HOURGLASS STIFFNESS",
+        "CONDUCTIVITY",
+        "SPECIFIC HEAT",
+        "LATENT HEAT",
+        "ELECTRICAL CONDUCTIVITY",
+    }
+)
+
+# Keywords that are skipped and reported by line: loads of the deck's own analyses, which a study defines itself, and material
+# behaviour beyond small vibration
+TOLD = frozenset(
+    {
+        "CLOAD",
+        "DSLOAD",
+        "DFLUX",
+        "CFLUX",
+        "DSFLUX",
+        "FILM",
+        "SFILM",
+        "RADIATE",
+        "SRADIATE",
+        "FIELD",
+        "BASE MOTION",
+        "LOAD CASE",
+        "END LOAD CASE",
+        "CONTACT PAIR",
+        "PLASTIC",
+        "CREEP",
+        "CYCLIC HARDENING",
+        "DEPVAR",
+    }
+)
+
+# Initial conditions without effect on mass and stiffness
+PASSING_CONDITIONS = frozenset({"TEMPERATURE", "DISPLACEMENT", "VELOCITY", "FIELD", "ROTATING VELOCITY"})
+
+ABAQUS_WORDS = frozenset({"PART", "ASSEMBLY", "PREPRINT"})  # keywords that CalculiX does not have
+
+# Damping, which a study defines in its own table
+DAMPING = frozenset({"DAMPING", "MODAL DAMPING", "GLOBAL DAMPING", "DAMPING CONTROLS"})
+# Keywords that are known to change the matrices
+REFUSED = frozenset(
+    {
+        "DISTRIBUTING COUPLING",
+        "CONTACT",
+        "SHELL SECTION",
+        "BEAM SECTION",
+        "BEAM GENERAL SECTION",
+        "MEMBRANE SECTION",
+        "ROTARY INERTIA",
+        "NONSTRUCTURAL MASS",
+        "GAP",
+        "SUBMODEL",
+        "MODEL CHANGE",
+        "PRE-TENSION SECTION",
+        "USER ELEMENT",
+        "MATRIX INPUT",
+        "MATRIX ASSEMBLE",
+        "NCOPY",
+        "NGEN",
+        "NFILL",
+        "NMAP",
+        "ELGEN",
+        "ELCOPY",
+        "SYSTEM",
+        "DISTRIBUTION",
+        "FOUNDATION",
+        "EMBEDDED ELEMENT",
+        "CONNECTOR SECTION",
+        "SUPER ELEMENT",
+        "SUBSTRUCTURE",
+        "HYPERELASTIC",
+        "HYPERFOAM",
+        "VISCOELASTIC",
+        "USER MATERIAL",
+        "SUBSTRUCTURE PROPERTY",
+        "SHELL TO SOLID COUPLING",
+        "PHYSICAL",
+        "IMPERFECTION",
+        "CHANGE MATERIAL",
+        "CHANGE SOLID SECTION",
+        "INITIAL STRAIN INCREASE",
+    }
+)
+
 
 MAX_INCLUDES = 200
 DEEPEST_INCLUDE = 10

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.readers.nastran_dofs import NastranDofs, read_nastran_dofs
+from stickslip.model.readers.nastran_bulk import NastranDofs, assembled, read_nastran_dofs, real_symmetric
 from stickslip.model.readers.nastran_library import (
     CUT_SHORT,
     check_lines,
@@ -136,33 +136,6 @@ def _check_size(path: Path, known: NastranDofs, dof_set: str, name: str, shape: 
     )
 
 
-def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Structure:
-    """Return the structure of mass, stiffness and perhaps damping, along the basic axes, in the file's units.
-
-    Parameters
-    ----------
-    matrices
-        Two or three (n, n) sparse matrices.
-    known
-        All degrees of freedom.
-    rows
-        (n,) degrees of freedom of the matrices.
-    """
-    turn = known.rotation(rows)
-    if turn is not None:
-        matrices = [(turn @ matrix @ turn.T).tocsr() for matrix in matrices]
-    used = np.flatnonzero(sum(abs(matrix).sum(axis=1) for matrix in matrices))
-    mass, stiffness, *damping = [matrix[used][:, used] for matrix in matrices]
-    massless = np.flatnonzero(abs(mass).sum(axis=1) == 0)
-    return Structure(
-        mass,
-        damping[0] if damping else scipy.sparse.csr_array(mass.shape),
-        stiffness,
-        known.table(rows[used]),
-        {"massless": massless} if len(massless) else {},
-    )
-
-
 def op4_matrices(path: Path, names: list[str], check: Callable[[str, tuple[int, int]], None]) -> dict[str, Matrix]:
     """Return the named matrices of a file, sparse and unchanged.
 
@@ -211,35 +184,6 @@ def _pick(path: Path, name: str, count: int) -> int:
     if not -count <= pick < count:
         raise input_error(str(path), f"has no {name!r}: there are {count}", "Count from 0.")
     return pick
-
-
-def real_symmetric(matrix: Matrix, place: str) -> Matrix:
-    """Return the symmetric part of a real matrix, (n, n) CSR; refuse an unsymmetric matrix.
-
-    Raises
-    ------
-    InputError
-        If it is not square, complex, not finite, or unsymmetric by more than rounding.
-    """
-    if matrix.shape[0] != matrix.shape[1]:
-        raise input_error(place, f"is {matrix.shape[0]} x {matrix.shape[1]}", "Give square matrices.")
-    if np.iscomplexobj(matrix.data):
-        if matrix.data.imag.any():
-            raise input_error(
-                place, "is complex", "Structural damping is an operation on the real stiffness here: write it without."
-            )
-        matrix = matrix.real
-    if not np.isfinite(matrix.data).all():
-        raise input_error(place, "holds numbers that are not finite", CUT_SHORT)
-    matrix = scipy.sparse.csr_array(matrix, dtype=float)
-    skew, largest = abs(matrix - matrix.T).max(), abs(matrix).max()
-    if skew > 1e-6 * largest:  # smaller differences come from single precision and few digits
-        raise input_error(
-            place,
-            f"is not symmetric: entries differ by {skew:.3g} from those across the diagonal",
-            "Give mass, stiffness and damping of a structure at rest.",
-        )
-    return scipy.sparse.csr_array((matrix + matrix.T) / 2)
 
 
 def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> NastranResults:

@@ -9,8 +9,7 @@ import scipy.optimize
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import normal_modes
+from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import normal_modes
+from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.wave_family import WaveFamily
 from stickslip.units import HZ

@@ -8,8 +8,7 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.blas_threads import by_one_thread
-from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.modes import normal_modes, with_springs
+from stickslip.model.modes import gyroscopic_modes, normal_modes, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.basis import in_basis, in_coordinates

@@ -29,8 +29,7 @@ from stickslip.model.readers.ansys_equations import read_ansys_links
 from stickslip.model.readers.ansys_materials import ansys_cell_materials
 from stickslip.model.readers.calculix_deck import Deck, held_like_partners, read_deck
 from stickslip.model.readers.frd import read_displacement
-from stickslip.model.readers.open_model import read_structure, refuse_other_models
-from stickslip.model.readers.summary import negative_damping, refuse_indefinite
+from stickslip.model.readers.open_model import negative_damping, read_structure, refuse_indefinite, refuse_other_models
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.material import TemperatureTable

@@ -24,9 +24,7 @@ from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import BodyPoints, Part, Place, Reducing, damper_part, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
-from stickslip.model.rigid.sides import ContactPoints
+from stickslip.model.rigid.dampers import ContactPoints, CylinderDamper, FlatCurvedDamper, WedgeDamper
 from stickslip.model.structure import Structure
 from stickslip.study.file.model.bodies import AXES, BODIES, Cylinder, FlatCurved, Placed, RigidBodyTable, Surface, Wedge
 from stickslip.study.file.model.material import ReductionTable

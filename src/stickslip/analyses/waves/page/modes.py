@@ -18,7 +18,7 @@ from stickslip.analyses.waves.page.resonant import MODE, WAVE
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
 from stickslip.analyses.waves.records import Modes, contact_state, hertz, stages, with_contacts
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.model.mesh.coarse import coarse_skin
+from stickslip.model.mesh.solid_mesh import coarse_skin
 from stickslip.report.content import Table, Words
 from stickslip.report.plot import FONT, INK, MUTED, Plot, colour, legend_above, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent

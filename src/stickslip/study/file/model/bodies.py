@@ -7,8 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
+from stickslip.model.rigid.dampers import CylinderDamper, FlatCurvedDamper, WedgeDamper
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, once, shown
 
