@@ -288,7 +288,7 @@ def test_a_beam_of_calculix_keeps_a_distance(tmp_path):
             "*MPC\nMEANROT, 5, 6, 7\n",
             r"line 33, \*MPC: an MPC of type MEANROT ties nodes and is not read. Read are PLANE, STRAIGHT, BEAM",
         ),
-        ("*MPC\nSTRAIGHT, 5, 9, 14\n", "node 14 does not lie on it"),
+        ("*MPC\nSTRAIGHT, 5, 9, 14\n", r"node 14 does not lie on the straight line of nodes \[5, 9\]"),
         ("*RIGID BODY, NSET=R\n", "lacks the parameter REF NODE"),
         ("*RIGID BODY, NSET=R, REF NODE=1, TIE NSET=R\n", "the parameter TIE NSET is not read"),
         (

@@ -1,11 +1,14 @@
 """Refusals whose words no other test reads: place, problem and remedy of each."""
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
+import scipy.sparse
 import xarray as xr
 from small_v2 import changed, write_four_masses
 from synthetic_result import tree_of
@@ -13,22 +16,48 @@ from test_clear_answers import LOAD, free_dofs, sweep, system
 from test_readers_deck import CUBE, deck_of
 
 import stickslip as ss
+from stickslip.api.export import Wanted
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.fluid.pressure import PressureField
+from stickslip.assembly.forces import Load
+from stickslip.assembly.sides.mistuning import BladeMistuning, ContactMistuning
 from stickslip.contact.laws.iwan import FirstLoading
 from stickslip.contact.loop_fit import fit_loops
 from stickslip.errors import InputError
+from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.matrices import real_symmetric
+from stickslip.harmonic.selection.goal_oriented import GoalOriented
+from stickslip.harmonic.selection.guarded_alert import GuardedAlert
+from stickslip.harmonic.travelling import condense_waves
+from stickslip.model.axis import Axis
+from stickslip.model.damping import modal_damping
+from stickslip.model.fe.beam import Beam, rotating_beam
+from stickslip.model.fe.material import (
+    ByTemperature,
+    ElasticMaterial,
+    Expansion,
+    Material,
+    Orientation,
+    elastic_material,
+)
+from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.matrices import chain, lumped
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.npz import read_npz, write_npz
 from stickslip.model.part import BodyPoints
+from stickslip.model.rigid.dampers import WedgeDamper
 from stickslip.model.structure import Structure
 from stickslip.model.structure_file import load_structure, save_structure
 from stickslip.reduction import InfluenceCoefficients
+from stickslip.reduction.coupled_stages import Flange, multistage
+from stickslip.reduction.cyclic import CyclicSector
+from stickslip.report.paper.figure import write_figure
 from stickslip.response.all_motions.found import MotionSearch
+from stickslip.response.bifurcations.locate import bifurcations
 from stickslip.response.forced.response import forced_problem
 from stickslip.response.residual_tractions.bounds import traction_bounds
 from stickslip.response.rotating.campbell import campbell
+from stickslip.response.rotating.safe import safe
 from stickslip.response.time.transient import check_outputs
 from stickslip.study.models.study import read_study
 
@@ -49,6 +78,26 @@ def loop(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def own_places() -> BodyPoints:
     return BodyPoints(("a",), np.zeros((2, 3)), np.zeros((1, 3, 3)))
+
+
+STEEL = Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0)
+BEAM = Beam(length=1.0, area=1e-4, second_moment=1e-8, material=STEEL)
+TETRAHEDRON = SolidMesh(np.vstack([np.zeros(3), np.eye(3)]), np.arange(4)[None, :], {"root": np.arange(3)})
+MAP = ss.response.NodalDiameterMap(6, np.arange(4), np.ones((4, 1)), np.ones((4, 1)))
+
+
+def large() -> Structure:
+    """Return masses on springs, more than a full matrix may have."""
+    one = scipy.sparse.eye_array(5002, format="csr")
+    return Structure(one, 0 * one, one, free_dofs(5002))
+
+
+def table(row: tuple[float, ...]) -> ByTemperature:
+    return ByTemperature((row,))
+
+
+def two_faces(axis: Axis | None) -> CyclicSector:
+    return CyclicSector(chain(4, 1.0, 1.0), 6, np.array([0]), np.array([1]), axis=axis)
 
 
 @pytest.mark.parametrize(
@@ -136,6 +185,119 @@ def own_places() -> BodyPoints:
         (
             lambda: ss.Result(tree_of(modes=xr.Dataset())).to_dataframe("modes"),
             "to_dataframe('modes'): holds no variables. Look at result.data.",
+        ),
+        (
+            lambda: Wanted(to="vtu", units="mm-t-s"),
+            "export: units: is mm-t-s, and only frd takes other units. Leave it out",
+        ),
+        (
+            lambda: ss.Result(tree_of(modes=xr.Dataset({"frequency_hz": ("mode", [1.0])}))).to_dataframe(
+                "modes", of="hz"
+            ),
+            "to_dataframe('modes', of='hz'): is no variable of it. Known: frequency_hz.",
+        ),
+        (lambda: Load(on="a", newton=math.nan), "Load: has nan N and a phase of 0.0 rad. Give finite numbers."),
+        (
+            lambda: Load(on="a", newton=1.0, harmonic=0, omega=5.0),
+            "Load.omega: is 5.0 rad/s and omega_ratio None, for a load in harmonic 0. Give one of the two, above zero",
+        ),
+        (
+            lambda: Load(on="a", newton=1.0, omega=5.0, omega_ratio=2.0),
+            "Load.omega: is 5.0 rad/s and omega_ratio 2.0, for a load in harmonic 1. Give one of the two, above zero",
+        ),
+        (
+            lambda: BladeMistuning(of="blade", deviations=np.array([0.0, np.nan])),
+            "BladeMistuning.deviations: must be finite, one number a blade or a row of modes a blade, got [ 0. nan].",
+        ),
+        (
+            lambda: BladeMistuning(of="blade", deviations=np.array([2.0, 0.1])),
+            "goes up to 2, and a blade deviates by at most 0.5. Deviations are relative: 0.01 is one per cent.",
+        ),
+        (
+            lambda: BladeMistuning(of="blade", deviations=np.zeros((4, 2)), modes=3),
+            "BladeMistuning.modes: is 3, and the deviations are of 2 modes. Leave it out.",
+        ),
+        (
+            lambda: ContactMistuning(contact="c", quantity="preload", values=np.array([np.inf])),
+            "ContactMistuning.values: must be finite, one number a sector, got [inf]. Give a list of numbers.",
+        ),
+        (lambda: GoalOriented(left_out=1.5), "GoalOriented.left_out: must lie from 0 to 1, got 1.5. 0.2 is usual."),
+        (lambda: GuardedAlert(quick=-0.1), "GuardedAlert.quick: must lie from 0 to 1, got -0.1. 0.5 is usual."),
+        (
+            lambda: modal_damping(large(), 0.01),
+            "modal_damping: 5002 dofs would need a full matrix. Reduce the structure first.",
+        ),
+        (
+            lambda: condense(large(), np.array([0]), ss.HarmonicLoad(np.zeros(5002), {})),
+            "condense: 5001 interior dofs. Reduce the structure first (craig_bampton).",
+        ),
+        (
+            lambda: condense_waves((chain(2, 1.0, 1.0),) * 2, np.array([0]), ss.HarmonicLoad(np.zeros(3), {})),
+            "condense_waves: a load of 3 entries for waves of [2] dofs. Give the load in the coordinates of the waves",
+        ),
+        (
+            lambda: rotating_beam(BEAM, 2, math.inf),
+            "rotating_beam: got hub radius 0.0 and speed inf. In m and rad/s.",
+        ),
+        (
+            lambda: elastic_material(np.eye(3), 1.0),
+            "elastic_material: matrix: has the shape (3, 3). Give six rows of six numbers.",
+        ),
+        (
+            lambda: ElasticMaterial(elastic=table((1.0, 2.0, 3.0)), density_table=table((1.0,))),
+            "ElasticMaterial.elastic: has 3 numbers a row. Give 2 (isotropic) or 36 (a matrix).",
+        ),
+        (
+            lambda: Orientation.of_axes((1, 0, 0), (2, 0, 0)),
+            "Orientation.of_axes: [1.0, 0.0, 0.0] and [2.0, 0.0, 0.0] span no plane. Give two vectors of different",
+        ),
+        (
+            lambda: ByTemperature(((1.0,), (2.0,)), (300.0, 20.0)),
+            "ByTemperature.temperatures: must rise, got [300.0, 20.0]. Give the lowest first.",
+        ),
+        (
+            lambda: Expansion(coefficients=table((1.0, 2.0))),
+            "Expansion.coefficients: has no rows of 1, 3 or 6 numbers. Give 1/K for each axis.",
+        ),
+        (
+            lambda: MotionSearch(omega_range=(1.0, 2.0), steps=8, harmonics=5, periods=1),
+            "MotionSearch.steps: is 8, too few for 5 harmonics over periods = 1. Give more than 10.",
+        ),
+        (
+            lambda: bifurcations(forced_problem(system(), LOAD, sweep()), [], tolerance=0.0),
+            "bifurcations: tolerance: must be between 0 and 1, got 0. 1e-6 is usual.",
+        ),
+        (lambda: sweep(threshold=math.nan), "Sweep.threshold: is not a number. 0.05 is 5 %."),
+        (lambda: safe(MAP, (3.0, 2.0), [1]), "safe: speed: needs 0 < lowest <= highest, got (3.0, 2.0). Give rad/s."),
+        (
+            lambda: CyclicSector(chain(4, 1.0, 1.0), 6, np.array([0]), np.array([1, 2])),
+            "CyclicSector: low, high: have shapes (1,) and (2,). Give each dof of one face and its partner on the other",
+        ),
+        (
+            lambda: multistage({"fan": two_faces(None)}, [Flange(("fan", "disc"), (np.array([2]),) * 2, (0,))]),
+            "multistage: fan: has no axis. Give the sector of a model with geometry.",
+        ),
+        (
+            lambda: multistage({"fan": two_faces(Axis())}, [Flange(("drum", "fan"), (np.array([2]),) * 2, (0,))]),
+            "multistage: there is no stage 'drum'. There are fan.",
+        ),
+        (
+            lambda: multistage({"fan": two_faces(Axis())}, [Flange(("fan", "disc"), (np.array([1]),) * 2, (0,))]),
+            "multistage: fan: has no free node on the flange. Name the nodes of the flange.",
+        ),
+        (
+            lambda: WedgeDamper(
+                left_angle=math.pi / 2, right_angle=math.pi / 2, top_width=0.0, height=0.01, length=1.0, mass=0.1
+            ),
+            "WedgeDamper.right_angle: is upright like the left side: the two never meet. Incline one.",
+        ),
+        (
+            lambda: rotating_solid(TETRAHEDRON, STEEL).at_speed(1.0, tangent="textbok"),
+            "RotatingSolid.at_speed: there is no tangent 'textbok'. Did you mean 'textbook'?",
+        ),
+        (
+            lambda: write_figure(go.Figure(), "response", Path("a.gif"), "1-column"),
+            "figure: a.gif: ends with '.gif'. Give one of .pdf",
         ),
     ],
 )

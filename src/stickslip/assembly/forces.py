@@ -74,8 +74,8 @@ class Load:
         if len(own) > 1 or any(not (math.isfinite(v) and v > 0.0) for v in own) or (own and not self.harmonic):
             raise input_error(
                 "Load.omega",
-                f"is {self.omega} rad/s, its ratio {self.omega_ratio}, of a load in harmonic {self.harmonic}",
-                "Give a load that vibrates one of them, above zero.",
+                f"is {self.omega} rad/s and omega_ratio {self.omega_ratio}, for a load in harmonic {self.harmonic}",
+                "Give one of the two, above zero, and harmonic 1 or more.",
             )
         if self.harmonic == 0 and self.phase:
             raise input_error(

@@ -71,8 +71,8 @@ class BladeMistuning:
         if values.ndim not in (1, 2) or not values.size or not np.all(np.isfinite(values)):
             raise input_error(
                 "BladeMistuning.deviations",
-                f"must be one number a blade, or a row of modes a blade, got shape {values.shape}",
-                "Give finite relative deviations, such as 0.01.",
+                f"must be finite, one number a blade or a row of modes a blade, got {np.array2string(values, threshold=6)}",
+                "Give relative deviations, such as 0.01.",
             )
         if np.abs(values).max() > LARGEST:
             raise input_error(
@@ -126,8 +126,8 @@ class ContactMistuning:
         if values.ndim != 1 or not np.all(np.isfinite(values)):
             raise input_error(
                 "ContactMistuning.values",
-                f"must be one number a sector, got shape {values.shape}",
-                "Give finite numbers.",
+                f"must be finite, one number a sector, got {np.array2string(values, threshold=6)}",
+                "Give a list of numbers.",
             )
         if self.quantity != "gap" and values.min(initial=0.0) <= -1.0:
             raise input_error(

@@ -327,12 +327,17 @@ def _one_mpc(
         links.equations.append((place, row))
     else:
         fixed = 3 if kind == "PLANE" else 2
-        links.linear(place, f"a {'plane' if fixed == 3 else 'straight line'}")
+        shape = "plane" if fixed == 3 else "straight line"
+        links.linear(place, f"a {shape}")
         for number, point in zip(numbers[fixed:], points[fixed:], strict=True):
-            links.equations += [(place, row) for row in _on_flat(place, numbers[:fixed], points[:fixed], number, point)]
+            links.equations += [
+                (place, row) for row in _on_flat(place, shape, numbers[:fixed], points[:fixed], number, point)
+            ]
 
 
-def _on_flat(place: str, fixed: list[int], base: FloatArray, number: int, point: FloatArray) -> Iterator[Vector]:
+def _on_flat(
+    place: str, shape: str, fixed: list[int], base: FloatArray, number: int, point: FloatArray
+) -> Iterator[Vector]:
     """Yield the equations that keep a node on the line or plane through two or three others."""
     edges = base[1:] - base[0]
     size = float(np.abs(edges).max())
@@ -340,11 +345,11 @@ def _on_flat(place: str, fixed: list[int], base: FloatArray, number: int, point:
     share = np.linalg.lstsq(edges.T, away, rcond=None)[0]
     _, strength, directions = np.linalg.svd(edges)
     if strength[-1] < ON_LINE * size:
-        raise input_error(place, f"nodes {fixed} do not span it", "Take other first nodes.")
+        raise input_error(place, f"nodes {fixed} span no {shape}", f"Name {len(fixed)} nodes that do first.")
     if np.linalg.norm(away - share @ edges) > 1e-3 * size:
         raise input_error(
             place,
-            f"node {number} does not lie on it",
+            f"node {number} does not lie on the {shape} of nodes {fixed}",
             "Straight lines and planes are read where the nodes lie on them.",
         )
     weights = np.append(1.0 - share.sum(), share)
@@ -413,7 +418,11 @@ def _elongation(nodes: list[int], along: list[int], table: NodeTable, place: str
     start, end = table.points[table.index(np.array(nodes))]
     length = float(np.linalg.norm(end - start))
     if length == 0.0:
-        raise input_error(place, f"nodes {nodes} lie at one place", "Its direction is that from one to the other.")
+        raise input_error(
+            place,
+            f"nodes {nodes} lie at one place and give it no direction",
+            "Use SPRING2 or DASHPOT2 with directions.",
+        )
     return _projected([(nodes[1], 1.0), (nodes[0], -1.0)], (end - start) / length)
 
 

@@ -94,7 +94,9 @@ def sectors_of(tables: Tables) -> int | None:
 def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
     for name, table in tables.part.items():
         if "." in name or name in (GROUND, NEXT.rstrip(".")):
-            yield input_error(f"part.{name}", "is no name of a part", "Give one without dots.")
+            yield input_error(
+                f"part.{name}", "is no name of a part", f"Give one without dots, other than {GROUND} and {NEXT[:-1]}."
+            )
         if isinstance(table, FileModel):
             for key, file in table.files().items():
                 if (home / file).exists() and not (home / file).is_file():
