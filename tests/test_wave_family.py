@@ -58,6 +58,23 @@ def test_factors_leave_the_schur_complement_of_the_rows_kept(seventh, number):
     np.testing.assert_allclose(dense @ solved, right, atol=1e-9)
 
 
+def test_fronts_are_complex_only_where_complex_entries_reach(seventh):
+    matrix = travelling_wave(seventh, 2).stiffness
+    found = multifrontal(matrix)
+    kinds = np.array([np.iscomplexobj(factor) for factor in found.lower])
+    assert 0 < kinds.sum() < kinds.size
+    children = {child for front in found.dissection.fronts for child in front.children}
+    for i, front in enumerate(found.dissection.fronts):
+        reached = any(kinds[child] for child in front.children)
+        own = matrix[found.dissection.order[front.first : front.last]].imag
+        assert kinds[i] or not reached
+        if not front.children:
+            assert i in children
+            assert kinds[i] == bool(abs(own).max() > 0)
+    for right in (RNG.standard_normal(matrix.shape[0]), RNG.standard_normal((matrix.shape[0], 3)) * 1j):
+        np.testing.assert_allclose(matrix @ found.solve(right), right, atol=1e-9)
+
+
 @pytest.mark.parametrize("contacts", [False, True])
 def test_waves_that_share_their_interior_have_the_same_modes(seventh, contacts, monkeypatch):
     """With springs to the neighbour, whose phase the waves have too."""

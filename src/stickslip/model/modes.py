@@ -95,7 +95,9 @@ def normal_modes(
     mean = _mean_square(structure)
     squares, shapes = [], []
     for part in connected_parts(structure.stiffness, structure.mass):
-        K, M = (submatrix(m, part, part) for m in (structure.stiffness, structure.mass))
+        K, M = structure.stiffness, structure.mass
+        if len(part) < structure.n:  # a copy of a whole large model would cost a gigabyte
+            K, M = submatrix(K, part, part), submatrix(M, part, part)
         count = min(n, int(np.count_nonzero(M.diagonal())))
         if not count:
             continue
