@@ -34,6 +34,9 @@ NUDGE = 1e-6  # difference step over the size of the motion
 HARMONICS = 6  # that are compared
 NEARBY = 1e-5  # relative difference of frequencies: at most 2 % of an amplitude with a damping ratio of 5e-4
 CLOSE = 5e-3  # of the largest amplitude: a balance is nearer to its motion as a rule
+TWINS = (
+    5e-4  # of the largest amplitude: what is farther from the told motion may have a twin that is nearer, beside a fold
+)
 LATER = (0.25, 0.5, 0.75)  # of a period
 CUT, CUT_STEPS = 0.3, 12  # share of a step that is taken, and how often, where whole steps leave
 ALIKE = 0.05  # of the largest amplitude: what is farther from the told motion is looked for beside the told frequency
@@ -389,6 +392,8 @@ class Judge:
         own = self._orbit(begin, free=False)
         if own is None or self._apart(own, motion) > CLOSE:
             own = self._nearest(begin, motion, own)
+        elif self._apart(own, motion) > TWINS:
+            own = min(own, self._beyond(motion, own) or own, key=lambda o: self._apart(o, motion))
         if own is not None and self._apart(own, motion) <= ALIKE:
             return own
         near = self._orbit(begin, free=True)
@@ -401,6 +406,14 @@ class Judge:
         found = [own, self._orbit(begin, free=False, cut=CUT)]
         found += [self._later(motion, share) for share in LATER]
         return min((o for o in found if o is not None), key=lambda o: self._apart(o, motion), default=None)
+
+    def _beyond(self, motion: npt.NDArray[np.complex128], own: Orbit) -> Orbit | None:
+        """Return the motion on the other side of the told one: beside a fold it lies between two."""
+        mirrored = np.zeros((max(len(motion), HARMONICS), motion.shape[1]), complex)
+        mirrored[: len(motion)] = 2.0 * motion
+        mirrored[:HARMONICS] -= own.motion
+        mirrored[HARMONICS:] /= 2.0
+        return self._orbit(self.start(mirrored), free=False)
 
     def _later(self, motion: npt.NDArray[np.complex128], share: float) -> Orbit | None:
         """Return the motion that is found from the told one at a later time: that of the machine whose load is ahead, turned back."""

@@ -8,7 +8,7 @@ from stickslip.errors import input_error
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.forced.along import SAFETY
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.found import Stability, changes
+from stickslip.response.stability.found import Stability, changes, may_leave
 from stickslip.response.stability.missing_harmonics import corrected_by_step, more_harmonics, with_more
 from stickslip.response.stability.multipliers import stability_in_time
 from stickslip.response.time.sectors import all_in_time
@@ -16,6 +16,7 @@ from stickslip.response.time.sectors import all_in_time
 ROUGHLY = 3.0  # error of a multiplier over its change by one Newton step
 FIRST = 2.0  # error of a multiplier over its change from the motion as solved
 SAME_MOTION = 0.1  # distance over the threshold, up to which a motion with more harmonics is the same motion
+MOST_FURTHER_ROWS = 1000  # of the balance that is solved to see whether multipliers meet
 OTHER = 2.0  # additional factor on both errors if the numbers of transitions differ
 
 
@@ -90,18 +91,20 @@ def settled_stability(problem: ForcedProblem, point: ForcedPoint, more: ForcedPo
         found = of_point(problem, more)
         best = _unsure(first) if found.unknown else _compared(found, first, FIRST)
         rung = _Rung(more, found, problem.real_error(point, more))
-        settled = _settled(problem, rung, 1.0, best, first.stability.work + found.work)
+        open_ = _open(problem, first, found, more.order)
+        settled = _settled(problem, rung, 1.0, best, first.stability.work + found.work, open_=open_)
         return _beside(problem, first, *settled)
     step = corrected_by_step(problem, point)
     if step is not None and step.point is point:
         return Settled(first.stability)
-    work, best = first.stability.work, _unsure(first)
+    work, best, open_ = first.stability.work, _unsure(first), False
     if step is not None:
         found = of_point(problem, step.point)
         work += found.work + step.work
         if not found.unknown:
             best = _compared(found, first, ROUGHLY)
-    return _beside(problem, first, *_settled(problem, first, FIRST, best, work))
+            open_ = _open(problem, first, found, step.point.order)
+    return _beside(problem, first, *_settled(problem, first, FIRST, best, work, open_=open_))
 
 
 def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung) -> Settled:
@@ -127,6 +130,18 @@ def _beside(problem: ForcedProblem, first: _Rung, found: Stability, last: _Rung)
     return Settled(found, with_more(first.point, own.coefficients, own.harmonics, bound))
 
 
+def _open(problem: ForcedProblem, first: _Rung, found: Stability, order: int) -> bool:
+    """Return whether a stable verdict needs one more motion: few harmonics move multipliers far, and a meeting may follow.
+
+    Not for large systems, whose next motion costs more than `MOST_FURTHER_ROWS` rows.
+    """
+    rows = problem.system.retained.size * (2 * (2 * order + 3) + 1)
+    worse = first.stability
+    if rows > MOST_FURTHER_ROWS or found.unknown or worse.unknown:
+        return False
+    return may_leave(found.floquet.multipliers, worse.floquet.multipliers)
+
+
 def _unsure(rung: _Rung) -> Stability:
     """Return the stability of a motion whose change with more harmonics is unknown."""
     own = rung.stability
@@ -134,21 +149,21 @@ def _unsure(rung: _Rung) -> Stability:
 
 
 def _settled(
-    problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float
+    problem: ForcedProblem, last: _Rung, times: float, best: Stability, work: float, *, open_: bool = False
 ) -> tuple[Stability, _Rung]:
     """Return the stability with increasing harmonics until it is settled, and the last motion.
 
-    The first error is `times` the change.
+    The first error is `times` the change. `open_`: one more motion is solved, whatever the verdict.
     """
     rungs = more_harmonics(problem, last.point)
-    while not best.settled and (more := next(rungs, None)) is not None:
+    while (open_ or not best.settled) and (more := next(rungs, None)) is not None:
         found = of_point(problem, more.point)
         work += found.work + more.work
         if found.unknown:
             continue
         best = _compared(found, last, times)
         last = _Rung(more.point, found, problem.real_error(last.point, more.point))
-        times = 1.0
+        times, open_ = 1.0, False
     return replace(best, work=work), last
 
 
