@@ -16,7 +16,7 @@ from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import settled, settled_stability, stability
 from stickslip.response.stability.course import course_of, cycle_of, has_transitions, sign_of
-from stickslip.response.stability.found import NEUTRAL, Floquet, Stability, changes
+from stickslip.response.stability.found import NEUTRAL, Floquet, Stability, changes, may_leave
 from stickslip.response.system import System
 
 DAMPING = 0.04
@@ -119,6 +119,25 @@ def test_a_modulus_counts_less_along_the_circle_until_the_pair_may_meet():
     near = 0.9 * np.exp(np.array([0.1j, -0.1j]))
     assert changes(near, new)[1] == pytest.approx(changes(near, new)[0])
     assert changes(new, np.zeros(0, dtype=complex))[0] == pytest.approx(np.full(2, 0.9))
+
+
+def test_two_pairs_that_meet_may_leave_the_circle_away_from_the_real_axis():
+    """The error of their modulus is then their whole change."""
+
+    def pairs(first: float, second: float, size: float = 0.98) -> np.ndarray:
+        angles = np.array([first, -first, second, -second])
+        return size * np.exp(1j * angles)
+
+    apart, moduli = changes(pairs(1.0, 2.0), pairs(1.02, 2.02))
+    assert moduli == pytest.approx(0.1 * apart)
+    apart, moduli = changes(pairs(1.0, 1.05), pairs(0.98, 1.07))
+    assert moduli == pytest.approx(apart)
+    # by 20 times its change a pair may reach another one, 0.6 rad away, but not one 1.6 rad away
+    assert may_leave(pairs(1.0, 1.6), pairs(0.98, 1.62))
+    assert not may_leave(pairs(0.8, 2.4), pairs(0.79, 2.41))
+    # strong damping keeps them inside, and pairs that did not move stay
+    assert not may_leave(pairs(1.0, 1.6, 0.3), pairs(0.98, 1.62, 0.3))
+    assert not may_leave(pairs(1.0, 1.6), pairs(1.0, 1.6))
 
 
 def test_the_list_of_transitions_does_not_depend_on_where_the_cycle_begins():

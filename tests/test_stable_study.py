@@ -314,6 +314,9 @@ def test_a_neighbour_of_what_time_attained_is_not_doubted() -> None:
     # not beyond the folds, nor where the contact opens otherwise
     assert 1 < len(carried) < len(every)
     assert neighbours_of(asked, response, every, []) == every
+    # a multiplier above 1 says growth: such points are integrated themselves
+    grow = [replace(e, multiplier=1.1) for e in every]
+    assert neighbours_of(asked, response, grow, [peak.omega]) == grow
 
 
 def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(

@@ -4,7 +4,8 @@ The march is the classical Runge-Kutta method with steps of the same length, and
 is part of the state and moves at the end of each step as far as its limit asks. Everything is computed with one step and with half of it; the difference is the judge's own error.
 
 Newton's method at the told frequency may leave for another motion. What is farther from the told one than `CLOSE` is looked for again, with steps
-that are cut, and from the told motion at other times of its period; the nearest counts. Where the branch turns there may
+that are cut, and from the told motion at other times of its period; the nearest counts. Beside a fold
+the told motion lies between two; the one beyond it is looked for, too. Where the branch turns there may
 be none at that frequency: there the motion and the frequency of the branch's nearest point are solved for together (Gauss-Newton steps of least length).
 It counts where its frequency is that of the point within `NEARBY`.
 """
@@ -34,9 +35,7 @@ NUDGE = 1e-6  # difference step over the size of the motion
 HARMONICS = 6  # that are compared
 NEARBY = 1e-5  # relative difference of frequencies: at most 2 % of an amplitude with a damping ratio of 5e-4
 CLOSE = 5e-3  # of the largest amplitude: a balance is nearer to its motion as a rule
-TWINS = (
-    5e-4  # of the largest amplitude: what is farther from the told motion may have a twin that is nearer, beside a fold
-)
+TWINS = 5e-4  # of the largest amplitude: beside a fold, a motion that is farther off may have a nearer twin
 LATER = (0.25, 0.5, 0.75)  # of a period
 CUT, CUT_STEPS = 0.3, 12  # share of a step that is taken, and how often, where whole steps leave
 ALIKE = 0.05  # of the largest amplitude: what is farther from the told motion is looked for beside the told frequency

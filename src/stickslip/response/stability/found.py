@@ -11,10 +11,10 @@ ROUGH = 0.5  # relative error of a multiplier above which it proves no growth
 NEUTRAL = 1e-3  # distance of a modulus from 1 up to which it counts as neither growth nor decay
 TURNED = 0.1  # share of a multiplier's change that counts as error of the modulus
 CLEAR = 2.0  # distance from the real axis, over a multiplier's change, below which a complex pair may become real
-
-Verdict = Literal["stable", "unstable", "neutral", "undecided"]
 # way of a multiplier to the motion with 63 harmonics over its first change: 8 to 85 at three points of stops (evidence.trust, seeds 190007 and 190008)
 FURTHER = 20.0
+
+Verdict = Literal["stable", "unstable", "neutral", "undecided"]
 ROUNDS_TO_ONE = 5e-4  # distance from 1 below which four digits may show 1
 UNIT_TOLERANCE = 1e-6  # distance from 1: far above the rounding of a period, far below the damping of any structure
 

@@ -60,7 +60,10 @@ def examined_points(question: Question, response: Response, examine: Examine) ->
 def neighbours_of(
     question: Question, response: Response, examined: list[Examined], attained: list[float]
 ) -> list[Examined]:
-    """Return all points; undecided ones are stable next to a point with the same transitions that is confirmed in time."""
+    """Return all points; undecided ones are stable next to a point with the same transitions that is confirmed in time.
+
+    Not those with a multiplier above 1: it says growth, though within its error.
+    """
     known = [e for e in examined if e.omega in attained]
     if not known or not any(e.verdict == "undecided" for e in examined):
         return examined
@@ -68,7 +71,7 @@ def neighbours_of(
     place = {position: k for k, position in enumerate(course.order)}
 
     def beside(e: Examined) -> Examined:
-        if e.verdict != "undecided" or e.motion:
+        if e.verdict != "undecided" or e.motion or e.multiplier > 1.0:
             return e
         near = [k for k in known if course.like(place[k.position], place[e.position])]
         if not near:

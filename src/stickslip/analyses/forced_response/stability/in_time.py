@@ -257,8 +257,8 @@ def check_in_time(
         return _motion(one, motion, min(_apart(balance, there) for balance in balances))
 
     motion = motion_of(check, found)
-    contradicts = multiplier is not None and isfinite(multiplier) and (after > PATIENCE or multiplier > 1.0)
-    if motion == "attained" and contradicts:
+    close = multiplier is not None and isfinite(multiplier) and (after > PATIENCE or multiplier > 1.0)
+    if motion == "attained" and close:
         # close to the unit circle the error of the steps may decide on which side of it a multiplier lies
         steps = 2 * check.steps
         finer = integrated(question.problem, point, question.model.load, kick=KICK, least=PATIENCE, steps=steps)
