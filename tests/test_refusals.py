@@ -207,7 +207,7 @@ def two_faces(axis: Axis | None) -> CyclicSector:
         ),
         (
             lambda: BladeMistuning(of="blade", deviations=np.array([0.0, np.nan])),
-            "BladeMistuning.deviations: must be finite, one number a blade or a row of modes a blade, got [ 0. nan].",
+            "BladeMistuning.deviations: must be finite, one number a blade or a row of modes a blade, got [0.0, nan].",
         ),
         (
             lambda: BladeMistuning(of="blade", deviations=np.array([2.0, 0.1])),

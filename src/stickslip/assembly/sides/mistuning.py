@@ -1,5 +1,6 @@
 """Mistuning: blades' frequencies, contacts, and parts that differ from sector to sector."""
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
@@ -71,7 +72,7 @@ class BladeMistuning:
         if values.ndim not in (1, 2) or not values.size or not np.all(np.isfinite(values)):
             raise input_error(
                 "BladeMistuning.deviations",
-                f"must be finite, one number a blade or a row of modes a blade, got {np.array2string(values, threshold=6)}",
+                f"must be finite, one number a blade or a row of modes a blade, got {reprlib.repr(values.tolist())}",
                 "Give relative deviations, such as 0.01.",
             )
         if np.abs(values).max() > LARGEST:
@@ -126,7 +127,7 @@ class ContactMistuning:
         if values.ndim != 1 or not np.all(np.isfinite(values)):
             raise input_error(
                 "ContactMistuning.values",
-                f"must be finite, one number a sector, got {np.array2string(values, threshold=6)}",
+                f"must be finite, one number a sector, got {reprlib.repr(values.tolist())}",
                 "Give a list of numbers.",
             )
         if self.quantity != "gap" and values.min(initial=0.0) <= -1.0:
