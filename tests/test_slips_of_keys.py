@@ -82,6 +82,7 @@ MISSPELT = [
     ("\nlaw = ", "\nlwa = ", ["contact.shroud.lwa: unknown key 'lwa'. Did you mean 'law'?"]),
     ("\nbetween = ", "\nbetwen = ", ["contact.shroud.betwen: unknown key 'betwen'. Did you mean 'between'?"]),
     ("\nfile = ", "\nfille = ", ["part.blade.fille: unknown key 'fille'. Did you mean 'file'?"]),
+    ("speed_rpm = ", 'axis = "y"\nspeed_rpm = ', ["rotation.axis: unknown key 'axis'. The axis belongs to the part"]),
     ("speed_rpm = ", "speed_hz = ", ["rotation.speed_hz: unknown key 'speed_hz'. Did you mean 'speed_rpm'? "]),
 ]
 

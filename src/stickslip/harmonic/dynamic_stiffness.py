@@ -197,8 +197,7 @@ class CondensedStiffness:
         states = self.spectral.states if np.any(s) else None
         if states is None:
             return self._solve_interior(s, right)[:, :, 0]
-        each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
-        return np.array([states.solve(p, own) for p, own in each])
+        return states.solve_each(1j * s[:, 0, 0], right[:, :, 0])
 
     def _onto(self, s: FloatArray, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_interior) forces of retained coordinates `q` on the interior.

@@ -40,6 +40,13 @@ class StateSpace:
         amplitudes *= weight if right.ndim == 1 else weight[:, None]
         return np.asarray(self.forward @ amplitudes)
 
+    def solve_each(self, p: ComplexArray, right: ComplexArray) -> ComplexArray:
+        """Return ``D_LL⁻¹ right`` (k, l), each row of `right` (k, l) at its own `p` (k,).
+
+        The eigenvectors are read once for all rows: they are far larger than a row.
+        """
+        return np.asarray((right @ self.backward.T / (1.0 - p[:, None] * self.nu)) @ self.forward.T)
+
     def solve_transposed(self, p: complex, right: ComplexArray) -> ComplexArray:
         """Return ``D_LL⁻ᵀ right`` for `right` (l, k)."""
         amplitudes = (self.forward.T @ right) / (1.0 - p * self.nu)[:, None]

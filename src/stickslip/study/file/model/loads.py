@@ -115,7 +115,10 @@ class LoadTable(Section):
 class Rotation(Section):
     """The rotor's speed, and the effects of rotation that are kept."""
 
-    speed_rpm: Speed = Field(0.0, description="speed in rpm; 0 is the wheel at rest")
+    speed_rpm: Speed = Field(
+        0.0,
+        description="speed in rpm, 0 is the wheel at rest; about the axis_direction of the parts from files, or else about z",
+    )
     tangent: Literal["consistent", "textbook"] = Field(
         "consistent",
         description="stiffness at speed: consistent (with the displacements of the static solution) or textbook "
@@ -125,6 +128,15 @@ class Rotation(Section):
     centrifugal: bool = Field(
         True, description="whether the centrifugal load of what rotates is a static load: true or false"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _axis_of_parts(cls, given: Any) -> Any:
+        found = [key for key in given if str(key).startswith("axis")] if isinstance(given, dict) else []
+        if found:
+            remedy = 'The axis belongs to the part that has a file: [part.NAME] axis_direction = "y". Without it the model turns about z.'
+            raise custom_error(f"unknown key {found[0]!r}", remedy, found[0])
+        return given
 
 
 class Operation(Section):
