@@ -195,7 +195,7 @@ def test_check_passes_what_new_writes(tmp_path: Path, kind: str) -> None:
     with_few_cases(tmp_path / "made" / "study.toml")
     said = done("check", str(tmp_path / "made" / "study.toml"))
     assert said.splitlines()[0].startswith("checking ")
-    assert f"{tmp_path / 'made' / 'study.toml'}: good to run" in said
+    assert f"{tmp_path / 'made' / 'study.toml'}: good to run\n" in said, "a template that its own check doubts"
     places = [said.index(f"\n{heading}:") for heading in SECTIONS.values() if heading in said]
     assert places == sorted(places)
     assert len(places) >= 3

@@ -493,8 +493,8 @@ def test_warnings_of_a_sweep_beside_all_resonances() -> None:
     (verdict,) = no_resonance(asked)
     assert f"{verdict.why}. {verdict.remedy}" == told
     assert no_resonance(lifted(omega_range=(40 * HZ, 70 * HZ))) == ()
-    assert mixed_places(("a.x", "b.rz"))[0].why.startswith("harmonics.alert_over mixes rotations (b.rz)")
-    assert mixed_places(("a.x", "b.y")) == ()
+    assert mixed_places(("a.x", "b.rz"), "each")[0].why.startswith("harmonics.alert_over mixes rotations (b.rz)")
+    assert mixed_places(("a.x", "b.y"), "each") == mixed_places(("a.x", "b.rz"), "answer") == ()
 
 
 def test_a_range_beside_the_engine_order_is_noted() -> None:

@@ -288,9 +288,30 @@ def test_kinds_are_found_by_their_names_alone() -> None:
         table_keys("wedge")
     with pytest.raises(InputError, match=r"'stickslip keys contact\.jenkins'"):
         table_keys("jenkins")
-    with pytest.raises(InputError, match=r"Known: beam, .*'stickslip keys part' has all"):
-        table_keys("part.damper")
     assert table_keys("part.NAME") == table_keys("part")
+    titles = [own.title for own in table_keys("part")]
+    assert titles[-2:] == ['[part.NAME] with file = "..."', '[part.NAME] with of = "..."']
+    (of_file,) = table_keys("part.file")
+    assert "axis_direction" in [row[0] for row in of_file.rows]
+
+
+def test_a_name_of_ones_own_behind_the_dot_is_told_as_one() -> None:
+    """A designer asks for part.damper: the kinds described as dampers come first, and a command shows the keys of one."""
+    with pytest.raises(
+        InputError, match=r'a name of your own; shape decides.* one of "flat_curved", .*keys part\.flat_curved'
+    ):
+        table_keys("part.damper")
+    with pytest.raises(InputError, match=r"a name of your own; law decides .*Known: bonded"):
+        table_keys("contact.left")
+    assert table_keys("load.shaker") == table_keys("load")
+    (found,) = table_keys("forced_response.points")
+    assert [row[0] for row in found.rows] == ["points"]
+    assert len(table_keys("part.damper.mass_kg")) > 1
+    assert [row[0] for row in table_keys("contact.left.law")[0].rows] == ["law"]
+    with pytest.raises(InputError, match=r"is no key of \[campbell\]. Did you mean 'engine_orders'"):
+        table_keys("campbell.engine_order")
+    with pytest.raises(InputError, match=r"It is a key of \[part\]: 'stickslip keys part\.mass_kg'"):
+        table_keys("mass_kg")
 
 
 def test_silence_is_a_matter_of_the_logging_level(

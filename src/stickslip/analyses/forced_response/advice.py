@@ -65,7 +65,7 @@ def advice(case: Case, model: Model) -> Advice:
     doubts = [
         *no_resonance(question),
         *nothing_pressed(question),
-        *mixed_places(question.model.error_labels),
+        *mixed_places(question.model.error_labels, question.sweep.relative_to),
         *(v for v in known if v.rank),
     ]
     cost = estimate(model, question.sweep) if question.stepping is None else None

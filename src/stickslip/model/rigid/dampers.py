@@ -380,7 +380,7 @@ def _axial() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class WedgeDamper:
-    """A rigid wedge: its section is a trapezoid whose two flat sides touch the platforms.
+    """A rigid wedge damper: its section is a trapezoid whose two flat sides touch the platforms.
 
     Parameters
     ----------
@@ -491,7 +491,7 @@ class WedgeDamper:
 
 @dataclass(frozen=True, kw_only=True)
 class CylinderDamper:
-    """A rigid cylinder along y that touches each of two platforms along a line.
+    """A rigid cylindrical damper along y that touches each of two platforms along a line.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ from stickslip.contact.law import ContactLaw
 from stickslip.contact.law_check import law_fault
 from stickslip.contact.laws import is_of_a_user
 from stickslip.model.structure import ROTATIONS
+from stickslip.response.forced.choices import RelativeTo
 from stickslip.response.free_motion import drift
 from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
@@ -31,7 +32,7 @@ def known(question: Question, response: Response, shift: tuple[float, float]) ->
     """
     return (
         *(doubt(text) for text in doubts_of_model(question)),
-        *(mixed_places(question.model.error_labels) if question.sweep.relative_to == "each" else ()),
+        *mixed_places(question.model.error_labels, question.sweep.relative_to),
         *nothing_pressed(question),
         *off_engine_order(question),
         *laws_of_ones_own(question, response),
@@ -48,8 +49,10 @@ def doubts_of_model(question: Question) -> list[str]:
     return [t for t in question.model.warnings if t not in others] + known.warnings(reach)
 
 
-def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
-    """Doubt an error norm that mixes rotations and displacements."""
+def mixed_places(labels: Sequence[str], relative_to: RelativeTo) -> tuple[Verdict, ...]:
+    """Doubt an error norm that holds rotations against displacements; that of the answer has a largest output for each unit."""
+    if relative_to == "answer":
+        return ()
     rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
     others = [label for label in labels if label not in rotations]
     if not rotations or not others:
