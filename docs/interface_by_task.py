@@ -44,6 +44,7 @@ TASKS = {
     "Two frequencies": ("response.quasi_periodic",),
     "Residual tractions": ("response.residual_tractions",),
     "Time": ("response.time",),
+    "Strength": ("model.strength",),
 }
 
 _INTRODUCTION = """\

@@ -67,7 +67,7 @@ class Beam:
     second_moment: float = quantity(
         "second moment of area for its bending, of a rectangle width times height³ / 12", "m4", above=0
     )
-    material: Material = quantity("the table of its material")  # noqa: RUF009
+    material: Material = quantity("the table of its material")
     shear_coefficient: float | None = quantity(
         "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli", default=None, above=0, usual=2
     )

@@ -1,0 +1,5 @@
+"""From the stress over a cycle to utilisation, margin and life."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
