@@ -1,11 +1,13 @@
 """The operating range of a machine: inside, margins by hand, amplitudes there, and what is refused."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from small_v2 import write_four_masses
 from synthetic_result import synthetic_result
 
 import stickslip as ss
@@ -14,10 +16,12 @@ from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import operation
-from stickslip.analyses.operation import NONE, Operating, of_frequencies, of_speeds
-from stickslip.analyses.waves.verdicts import in_operation
+from stickslip.analyses.operation import InOperation, Met, Operating, answered, ends_of, of_frequencies
+from stickslip.analyses.waves.verdicts import in_operation, safe_in_operation
 from stickslip.errors import InputError
 from stickslip.study.file.model.loads import Operation
+from stickslip.study.models.study import read_study
+from stickslip.study.run import asked_for, not_used
 from stickslip.units import HZ, millimetres
 
 
@@ -39,11 +43,12 @@ def test_a_margin_is_over_the_nearer_end(value: float, margin: float, told: str)
 def test_speeds_become_frequencies_by_the_engine_order_or_are_refused() -> None:
     asked = Operation(operating_rpm=[3000.0, 3600.0])
     assert of_frequencies(asked, 4) == pytest.approx((200.0, 240.0))
-    assert of_speeds(asked) == Operating(3000.0, 3600.0, "rpm")
+    assert InOperation(**ends_of(asked)).operating == Operating(3000.0, 3600.0, "rpm")
     with pytest.raises(InputError, match=r"operation.operating_rpm: gives speeds .* Give operating_hz"):
         of_frequencies(asked, None)
     assert of_frequencies(Operation(operating_hz=[10.0, 20.0]), None) == (10.0, 20.0)
-    assert of_speeds(Operation(operating_hz=[10.0, 20.0])) == NONE
+    assert InOperation(**ends_of(Operation(operating_hz=[10.0, 20.0]))).operating == Operating(10.0, 20.0, "Hz")
+    assert not InOperation(**ends_of(Operation())).operating.known
     assert np.isnan(of_frequencies(Operation(), 4)).all()
     for given, said in (
         ({"operating_hz": [20.0, 10.0]}, "operating_hz"),
@@ -104,13 +109,11 @@ def test_a_range_in_speeds_is_told_in_speeds_and_what_is_not_swept_is_doubted() 
     assert list(operation(Curve(synthetic_result(ratios=(20,), n=24, verify=False), 0))) == []
 
 
-def test_crossings_are_held_against_the_operating_speeds() -> None:
-    def diagram(low: float, high: float) -> Any:
-        met = [(0, SimpleNamespace(engine_order=m, mode=0, speed_rpm=v)) for m, v in ((6, 5920.9), (8, 5038.3))]
-        waves = [SimpleNamespace(wave_number=6, nodal_diameter=6, kind="forward")]
-        speeds = np.array([0.0, 6000.0])
+def test_crossings_are_held_against_the_operating_range() -> None:
+    def diagram(low: float, high: float, unit: str = "rpm") -> Any:
+        met = [Met(f"EO {m} with ND 6", m, v) for m, v in ((6, 5920.9), (8, 5038.3))]
         return SimpleNamespace(
-            operating=Operating(low, high, "rpm"), speeds_rpm=speeds, crossings=met, waves=waves, sectors=24
+            operating=Operating(low, high, unit), speeds_rpm=np.array([0.0, 6000.0]), met=met, speed_rpm=6000.0
         )
 
     (outside,) = in_operation(diagram(5200.0, 5900.0))
@@ -120,6 +123,39 @@ def test_crossings_are_held_against_the_operating_speeds() -> None:
     beyond, _ = in_operation(diagram(5000.0, 6100.0))
     assert (beyond.level, beyond.remedy) == ("doubtful", "Widen campbell.speeds_rpm.")
     assert list(in_operation(diagram(np.nan, np.nan))) == []
+    # EO 6 at 5920.9 rpm excites at 592.09 Hz, EO 8 at 5038.3 rpm at 671.77 Hz
+    (hertz,) = in_operation(diagram(500.0, 590.0, "Hz"))
+    assert (
+        "lies in the operating range, 500 to 590 Hz; the nearest is 0.35 % above it, EO 6 with ND 6 at 592.09 Hz"
+        in hertz.why
+    )
+    assert list(safe_in_operation(diagram(np.nan, np.nan))) == []
+    # the interference diagram says the same of its resonances, and doubts that it is drawn elsewhere
+    elsewhere, found = safe_in_operation(diagram(5000.0, 5300.0))
+    assert (elsewhere.level, elsewhere.why.split(":")[0]) == (
+        "doubtful",
+        "the diagram is drawn at 6000 rpm, 13 % above the operating speeds, 5000 to 5300 rpm",
+    )
+    assert found.why.startswith(
+        "1 resonance inside the operating speeds, 5000 to 5300 rpm: EO 8 with ND 6 at 5038.3 rpm"
+    )
+    assert answered(Operating(5000.0, 5300.0, "rpm"), diagram(0.0, 1.0).met, "resonance") == (
+        "1",
+        "resonance inside the operating speeds, 5000 to 5300 rpm",
+        "EO 8 with ND 6",
+    )
+
+
+def test_a_range_that_no_analysis_uses_is_told(tmp_path: Path) -> None:
+    path = write_four_masses(tmp_path)
+    before, _, rest = path.read_text().partition("[forced_response]")
+    text = before + "[nonlinear_mode]\nmodes = [1]\n\n" + rest[rest.index("\n[") :]
+    for extra, found in (("[operation]\noperating_hz = [10.0, 12.0]\n", 1), ("", 0)):
+        path.write_text(text + extra)
+        study = read_study(path)
+        told = not_used(study, asked_for(study))
+        assert len(told) == found
+        assert all("[nonlinear_mode] does not use it. Ask for [forced_response] or [campbell]" in t for t in told)
 
 
 def test_the_amplitude_at_the_end_of_the_range_is_that_of_the_oscillator() -> None:

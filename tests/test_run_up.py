@@ -204,6 +204,35 @@ def test_python_and_an_interrupted_run_give_the_same(finished, tmp_path):
         np.testing.assert_array_equal(one.coefficients, other.coefficients)
 
 
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ({"rpm": (8300.0, 8800.0)}, "engine order 2: the peak lies "),
+        ({"rpm": (8000.0, 8800.0)}, "the run-up leaves out some of the operating speeds, 8000 to 8800 rpm"),
+        ({"hz": (275.0, 290.0)}, "operating range, 275 to 290 Hz"),
+    ],
+)
+def test_peaks_are_held_against_the_operating_range(finished, ends, said):
+    """The largest amplitude inside is that of the points, or lies on the straight line between two at an end."""
+    data = finished[1].data["run_up"].to_dataset().isel(case=0)
+    given = {f"operating_{end}_{unit}": r[i] for unit, r in ends.items() for i, end in enumerate(("lowest", "highest"))}
+    found = replace(record_of(RunUp, data), limit=0.05, **given)
+    told = [v.why for v in case_verdicts("", found)]
+    assert any(said in why for why in told), told
+    (unit, (low, high)) = next(iter(ends.items()))
+    for line in found.lines:
+        at = {"rpm": 1.0, "hz": line.engine_order / 60.0}[unit]
+        own = found.along(line)
+        fine = np.linspace(max(low / at, own[0].speed_rpm), min(high / at, own[-1].speed_rpm), 20001)
+        straight = np.interp(fine, [p.speed_rpm for p in own], [p.amplitude[found.report_output] for p in own])
+        size, rpm = found.largest_in_operation(line)
+        if fine[0] > fine[-1]:
+            assert np.isnan(size)
+        else:
+            assert size == pytest.approx(straight.max(), rel=1e-3)
+            assert low / at <= rpm <= high / at
+
+
 class Kept(dict):
     """Notes of a job, in memory."""
 

@@ -1,14 +1,20 @@
 """The operating range of a machine, and the distance of resonances from it."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from stickslip.column import column
 from stickslip.errors import input_error
+from stickslip.report.quantities import counted
 from stickslip.study.analysis import Case
 from stickslip.study.file.model.loads import Operation
+from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, RPM
 
+NAMED = 4  # resonances that a sentence names
 MARGIN = "The margin is relative to the nearer end of the range."
 
 
@@ -44,25 +50,99 @@ class Operating:
         off = self.margin(value)
         return f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'}" if off else "inside"
 
+    @property
+    def name(self) -> str:
+        """What the range is, as a noun."""
+        return "operating speeds" if self.unit == "rpm" else "operating range"
+
+    def at(self, rpm: float, order: int) -> float:
+        """Return the excitation by an engine order at a speed, in the unit of the range."""
+        return rpm if self.unit == "rpm" else order * rpm * RPM / HZ
+
     def __str__(self) -> str:
         return f"{self.lowest:.5g} to {self.highest:.5g} {self.unit}"
 
 
-NONE = Operating(np.nan, np.nan, "Hz")
+@dataclass(frozen=True)
+class Met:
+    """A resonance that an engine order excites.
+
+    Parameters
+    ----------
+    name
+        Engine order and mode, in words.
+    order
+        Engine order.
+    rpm
+        Speed at which they meet.
+    """
+
+    name: str
+    order: int
+    rpm: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InOperation:
+    """Operating range of the machine, stored beside the answer."""
+
+    operating_lowest_rpm: float = column("rpm", "lowest operating speed, NaN without one", default=np.nan)
+    operating_highest_rpm: float = column("rpm", "highest operating speed", default=np.nan)
+    operating_lowest_hz: float | None = column(
+        "Hz", "lowest operating frequency of the excitation, where frequencies were given", default=None
+    )
+    operating_highest_hz: float | None = column("Hz", "highest operating frequency of the excitation", default=None)
+
+    @property
+    def operating(self) -> Operating:
+        """Operating range as it was given."""
+        if self.operating_lowest_hz is not None and self.operating_highest_hz is not None:
+            return Operating(self.operating_lowest_hz, self.operating_highest_hz, "Hz")
+        return Operating(self.operating_lowest_rpm, self.operating_highest_rpm, "rpm")
+
+
+def ends_of(asked: Operation) -> dict[str, Any]:
+    """Return the fields of `InOperation` from the table of a study."""
+    given = {"rpm": asked.operating_rpm, "hz": asked.operating_hz}
+    ends = {unit: range_ for unit, range_ in given.items() if range_}
+    return {f"operating_{end}_{u}": r[i] for u, r in ends.items() for i, end in enumerate(("lowest", "highest"))}
+
+
+def of_resonances(own: Operating, met: Sequence[Met], noun: str) -> Iterator[Verdict]:
+    """Yield the resonances inside the operating range, or the margin of the nearest one, in words."""
+    if not own.known or not met:
+        return
+    ordered = sorted(met, key=lambda one: abs(own.margin(own.at(one.rpm, one.order))))
+    told = [f"{one.name} at {own.at(one.rpm, one.order):.5g} {own.unit}" for one in ordered]
+    inside = sum(not own.margin(own.at(one.rpm, one.order)) for one in ordered)
+    if inside:
+        more = f" and {inside - NAMED} more" if inside > NAMED else ""
+        why = f"{counted(inside, noun)} inside the {own.name}, {own}: {', '.join(told[: min(inside, NAMED)])}{more}"
+        remedy = "The machine runs at these resonances: judge their amplitudes, or shift them."
+        yield Verdict("trusted", why=why, remedy=remedy)
+        return
+    where = own.where(own.at(ordered[0].rpm, ordered[0].order))
+    them = "them" if own.unit == "rpm" else "it"
+    why = f"no {noun} lies in the {own.name}, {own}; the nearest is {where} {them}, {told[0]}"
+    yield Verdict("trusted", why=why, remedy=MARGIN)
+
+
+def answered(own: Operating, met: Sequence[Met], noun: str) -> tuple[str, str, str] | None:
+    """Return value, label and note of the answer about the operating range; None without a range or a resonance."""
+    if not own.known or not met:
+        return None
+    ordered = sorted(met, key=lambda one: abs(own.margin(own.at(one.rpm, one.order))))
+    where = [own.where(own.at(one.rpm, one.order)) for one in ordered]
+    if inside := where.count("inside"):
+        names = ", ".join(one.name for one in ordered[: min(inside, NAMED)])
+        return str(inside), f"{noun}{'s' * (inside > 1)} inside the {own.name}, {own}", names
+    return where[0], f"margin of the nearest {noun} to the {own.name}, {own}", ordered[0].name
 
 
 def asked_of(case: Case) -> Operation:
     """Return the table [operation] of a case; an empty one for a case whose tables lack it."""
     found: Operation = getattr(case.settings, "operation", None) or Operation()
     return found
-
-
-def of_speeds(asked: Operation) -> Operating:
-    """Return the operating speeds in rpm; `NONE` if the study has none."""
-    if not asked.operating_rpm:
-        return NONE
-    low, high = asked.operating_rpm
-    return Operating(low, high, "rpm")
 
 
 def of_frequencies(asked: Operation, engine_order: int | None) -> tuple[float, float]:

@@ -80,9 +80,9 @@ class OperationKeys(TypedDict, total=False):
     """Keys of [operation]."""
 
     operating_hz: Sequence[float] | FloatArray | None
-    """operating range [lowest, highest] of the excitation in Hz, for [forced_response]"""
+    """operating range [lowest, highest] of the excitation in Hz, for [forced_response], [campbell], [safe] and [run_up]"""
     operating_rpm: Sequence[float] | FloatArray | None
-    """operating speeds [lowest, highest] in rpm, for [campbell], and for [forced_response] with an engine order"""
+    """operating speeds [lowest, highest] in rpm, for [campbell], [safe] and [run_up], and for [forced_response] with an engine order"""
 
 
 class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, total=False):
@@ -340,8 +340,8 @@ class FlutterKeys(TypedDict, total=False):
     """damping ratio in % that every wave must have, structural damping included; 0: none may grow; default 0.0"""
 
 
-class SafeKeys(TypedDict, total=False):
-    """Keys of [safe]."""
+class SafeKeys(OperationKeys, total=False):
+    """Keys of [safe] and [operation]."""
 
     contacts: Literal["static", "stuck", "open"]
     """what contacts do: static (those pressed by the static loads stick, the others are open), stuck or open; default 'static'"""
@@ -355,8 +355,8 @@ class SafeKeys(TypedDict, total=False):
     """number of modes of each nodal diameter, 1 to 200; default 6"""
 
 
-class RunUpKeys(HarmonicsKeys, SolverKeys, LimitsKeys, total=False):
-    """Keys of [run_up], [harmonics], [solver] and [limits]."""
+class RunUpKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, total=False):
+    """Keys of [run_up], [harmonics], [solver], [limits] and [operation]."""
 
     speeds_rpm: Required[Sequence[float] | FloatArray]
     """the range [lowest, highest] of the speed in rpm, above zero, the lower first"""

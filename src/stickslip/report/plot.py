@@ -118,9 +118,13 @@ def legend_above(figure: go.Figure) -> None:
     figure.update_layout(legend=_ROW_ABOVE, margin={"t": 74})
 
 
-def shade(figure: go.Figure, low: float, high: float) -> None:
-    """Shade a range of the abscissa of all panels, below the curves."""
-    figure.add_vrect(x0=low, x1=high, fillcolor=GRID, opacity=0.7, line_width=0, layer="below")
+def shade(figure: go.Figure, low: float, high: float, *, along: str = "x") -> None:
+    """Shade a range of the abscissa of all panels, or of the ordinate, below the curves."""
+    look = {"fillcolor": GRID, "opacity": 0.7, "line_width": 0, "layer": "below"}
+    if along == "x":
+        figure.add_vrect(x0=low, x1=high, **look)
+    else:
+        figure.add_hrect(y0=low, y1=high, **look)
 
 
 def ring(colour: object, size: float, width: float = 1.4) -> dict[str, object]:

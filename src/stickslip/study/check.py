@@ -12,7 +12,7 @@ from stickslip.assembly.model import Model
 from stickslip.model.slow_steps import step, told_when_slow
 from stickslip.study.analysis import Advice
 from stickslip.study.models.study import Study
-from stickslip.study.run import asked_for, of_task
+from stickslip.study.run import asked_for, not_used, of_task
 from stickslip.study.store.progress import LOG, tell
 from stickslip.study.verdict import together
 
@@ -45,7 +45,7 @@ def check_study(study: Study) -> tuple[str, ...]:
                 model = case.build()
             with step(f"pairing the points of {len(model.contacts)} contacts"):
                 pairs = model.pairs
-            every = [Advice(computed=(_size(model, len(pairs.names)),))]
+            every = [Advice(computed=(_size(model, len(pairs.names)),), doubts=tuple(not_used(study, asked)))]
             every += [Advice(computed=tuple(first_nodes(model.places, model.outputs)), doubts=model.warnings)]
             every += [_as_advice(one.check(case, model)) for one in asked]
             every += [Advice(at_rest=tuple(_free(model)))]

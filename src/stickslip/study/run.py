@@ -116,6 +116,8 @@ def run_study(
             _refuse_result_of_another(study)
         with written_down(log):
             LOG.info(f"stickslip {__version__}, study {study.path}")
+            for line in not_used(study, asked):
+                LOG.info(line)
             try:
                 return _run(study, asked, place, fresh, frozenset(checks))
             except KeyboardInterrupt:
@@ -146,6 +148,16 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
             f"Add a table of an analysis: {', '.join(f'[{name}]' for name in ANALYSES)}.",
         )
     return [named(name) for name in wanted]
+
+
+def not_used(study: Study, asked: Sequence[Analysis]) -> list[str]:
+    """Return a sentence on an operating range that no asked analysis holds its answers against."""
+    given = study.tables.operation.model_fields_set
+    if not given or any("operation" in one.shared for one in asked):
+        return []
+    using = " or ".join(f"[{name}]" for name in ANALYSES if "operation" in named(name).shared)
+    names = " and ".join(f"[{one.name}]" for one in asked)
+    return [f"[operation] changes nothing: {names} does not use it. Ask for {using}, or remove it."]
 
 
 def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None) -> Outcome:

@@ -54,7 +54,7 @@ from stickslip.analyses.forced_response.summary import tables
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.cases import verdicts
 from stickslip.analyses.forced_response.verdicts.working_range import with_regimes
-from stickslip.analyses.operation import asked_of, of_frequencies, of_speeds
+from stickslip.analyses.operation import asked_of, of_frequencies
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import unreduced_line
 from stickslip.errors import SingularError
@@ -144,7 +144,7 @@ def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
 def _operating(solved: Solved) -> Values:
     """Return the operating range of a case; nothing if the study has none."""
     asked = asked_of(solved.case)
-    speeds = of_speeds(asked)
+    lowest_rpm, highest_rpm = asked.operating_rpm or (np.nan, np.nan)
     order = json.loads(str(solved.notes.get("model", {}).get("attributes", "{}"))).get("engine_order")
     low, high = of_frequencies(asked, order)
     if not np.isfinite(low):
@@ -153,8 +153,8 @@ def _operating(solved: Solved) -> Values:
         OperatingRange(
             operating_lowest_hz=low,
             operating_highest_hz=high,
-            operating_lowest_rpm=speeds.lowest,
-            operating_highest_rpm=speeds.highest,
+            operating_lowest_rpm=lowest_rpm,
+            operating_highest_rpm=highest_rpm,
         )
     )
 

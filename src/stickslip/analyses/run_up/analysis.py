@@ -179,6 +179,6 @@ RUN_UP = Analysis(
     dataset=_dataset,
     check=_check,
     summary=tables,
-    shared=("harmonics", "solver", "limits"),
+    shared=("harmonics", "solver", "limits", "operation"),
     answers=(RunUp,),
 )

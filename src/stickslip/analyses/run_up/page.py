@@ -6,10 +6,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.analyses.columns import CaseView
+from stickslip.analyses.operation import Met, answered
 from stickslip.analyses.run_up.records import LinePoint, RunUp
 from stickslip.arrays import FloatArray
 from stickslip.report.content import Table
-from stickslip.report.plot import BROKEN, INK, MUTED, Plot, colour, styled
+from stickslip.report.plot import BROKEN, INK, MUTED, Plot, colour, shade, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
 
@@ -100,6 +101,7 @@ def campbell_with_response(view: RunUpView) -> Plot:
             },
             hovertemplate=f"EO {order}: %{{customdata:.5g}} {scale.unit} at %{{x:.6g}} rpm, %{{y:.6g}} Hz<extra></extra>",
         )
+    shaded = _shade_operation(figure, view)
     styled(figure, 640)
     width = float(np.ptp(speeds))
     figure.update_xaxes(
@@ -112,9 +114,18 @@ def campbell_with_response(view: RunUpView) -> Plot:
     caption = (
         f"Amplitude of {view.output_name} along {counted(len(found.lines), 'engine order')}: size and colour of the circles; the largest is "
         f"{quantity(top, 'm')}. Each point has the stiffness, the contact state and the static preload of its own speed. Lines: natural "
-        "frequencies of the waves that the engine orders excite, with all contacts stuck (solid) and open (dotted)."
+        f"frequencies of the waves that the engine orders excite, with all contacts stuck (solid) and open (dotted).{shaded}"
     )
     return Plot(f"run_up{view.key}", "Campbell diagram with the response", caption, figure)
+
+
+def _shade_operation(figure: go.Figure, view: RunUpView) -> str:
+    """Shade the operating range; return the sentence for the caption, empty for none."""
+    own = view.found.operating
+    if not own.known:
+        return ""
+    shade(figure, own.lowest, own.highest, along="x" if own.unit == "rpm" else "y")
+    return f" Shaded: the {own.name}."
 
 
 def amplitudes(view: RunUpView) -> Plot:
@@ -134,10 +145,11 @@ def amplitudes(view: RunUpView) -> Plot:
             marker={"size": 4},
             hovertemplate=f"EO {order}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm, %{{customdata:.0f}} % of the contacts slip<extra></extra>",
         )
+    shaded = _shade_operation(figure, view) if view.found.operating.unit == "rpm" else ""
     styled(figure, 480)
     figure.update_xaxes(title_text="speed (rpm)", exponentformat="none", separatethousands=True)
     figure.update_yaxes(title_text=f"amplitude of {view.output_name} ({scale.unit})", rangemode="tozero")
-    caption = "Amplitude over speed, a line an engine order; points without a solution are left out."
+    caption = f"Amplitude over speed, a line an engine order; points without a solution are left out.{shaded}"
     return Plot(f"run_up_amplitude{view.key}", "Amplitude over speed", caption, figure)
 
 
@@ -239,7 +251,16 @@ def _cards(view: RunUpView) -> list[Card]:
         return []
     top = max(known, key=lambda line: line.peak_amplitude)
     note = f"engine order {top.engine_order} at {number(top.peak_speed_rpm, 5)} rpm"
-    return [Card(quantity(top.peak_amplitude, "m"), "largest amplitude of the run-up", note)]
+    first = Card(quantity(top.peak_amplitude, "m"), "largest amplitude of the run-up", note)
+    own = view.found.operating
+    met = [Met(f"engine order {li.engine_order}", li.engine_order, li.peak_speed_rpm) for li in known if li.peak_inside]
+    operating = answered(own, met, "peak")
+    if operating is None:
+        return [first]
+    largest = max(size for size, _ in map(view.found.largest_in_operation, known))
+    value, label, note = operating
+    note += f"; largest amplitude there {quantity(largest, 'm')}" * bool(np.isfinite(largest))
+    return [first, Card(value, label, note)]
 
 
 _NEEDS = ("engine_orders", "speed_rpm", "amplitude", "stuck_hz")

@@ -1,12 +1,13 @@
 """Records of a run-up: engine orders, the points along them, fast run-ups, and the record of a case."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
+from stickslip.analyses.operation import InOperation, asked_of, ends_of
 from stickslip.analyses.run_up.problem import DRAWN, Along, Question, RunUpPoint
 from stickslip.arrays import FloatArray
 from stickslip.column import column, rows
@@ -98,7 +99,7 @@ class FastRunUp:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RunUp:
+class RunUp(InOperation):
     """Record of a case; without lines if its job was not finished.
 
     Attributes
@@ -131,11 +132,30 @@ class RunUp:
         """Return the point with the largest amplitude along an engine order; None if no point has a solution."""
         return self.points[line.peak_point] if line.peak_point >= 0 else None
 
+    def largest_in_operation(self, line: Line) -> tuple[float, float]:
+        """Return the largest amplitude (m) along an engine order in the operating range and its speed (rpm); NaN for none.
+
+        Between two points at an end of the range the amplitude lies on the straight line.
+        """
+        own, order = self.operating, line.engine_order
+        known = [point for point in self.along(line) if point.converged]
+        rpm = np.array([point.speed_rpm for point in known])
+        size = np.array([point.amplitude[self.report_output or 0] for point in known])
+        unit = 1.0 if own.unit == "rpm" else own.at(1.0, order)
+        low, high = own.lowest / unit, own.highest / unit
+        found = list(zip(size, rpm, strict=True))
+        for end in (low, high):
+            crossed = np.flatnonzero((rpm[:-1] - end) * (rpm[1:] - end) < 0.0)
+            share = (end - rpm[crossed]) / (rpm[crossed + 1] - rpm[crossed])
+            found += [(y, end) for y in size[crossed] + share * (size[crossed + 1] - size[crossed])]
+        inside = [(float(y), float(x)) for y, x in found if low <= x <= high and np.isfinite(y)]
+        return max(inside, default=(np.nan, np.nan))
+
 
 def answer(solved: Solved) -> RunUp:
     """Return the record of a case from the notes of its job."""
     found: RunUp = from_flat(solved.notes[FOUND], RunUp) if FOUND in solved.notes else RunUp()
-    return found
+    return replace(found, **ends_of(asked_of(solved.case)))
 
 
 def steady_run_up(question: Question, points: Sequence[RunUpPoint]) -> RunUp:

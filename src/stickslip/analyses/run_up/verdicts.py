@@ -7,10 +7,12 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import record_of
+from stickslip.analyses.operation import MARGIN
 from stickslip.analyses.run_up.records import FastRunUp, Line, RunUp
 from stickslip.study.analysis import TextTable
 from stickslip.study.store.netcdf import one_case
 from stickslip.study.verdict import Verdict, from_json
+from stickslip.units import millimetres
 
 TOO_FAST = 0.05  # share neglected by slowly varying amplitudes, above which there is a doubt
 BETWEEN = 1e-5  # error of the model between its speeds, above which there is a doubt
@@ -26,6 +28,7 @@ def case_verdicts(label: str, found: RunUp) -> list[Verdict]:
     if not found.lines:
         return []
     told = [replace(v, case=label) for v in (*from_json(found.doubts), UNKNOWN)]
+    told += [replace(v, case=label) for v in _in_operation(found)]
     own = [v for line in found.lines for v in _of_line(label, found, line)]
     own += [v for fast in found.fast for v in _of_fast(label, fast)]
     return [*told, *(own or [Verdict("trusted", label, None, _followed(found))])]
@@ -34,6 +37,30 @@ def case_verdicts(label: str, found: RunUp) -> list[Verdict]:
 def _followed(found: RunUp) -> str:
     most = max(found.points[line.peak_point].error for line in found.lines)
     return f"every engine order was followed; more harmonics are predicted to change their peaks by {100 * most:.2g} % at most"
+
+
+def _in_operation(found: RunUp) -> Iterator[Verdict]:
+    """Note the peaks inside the operating range or their margin, with the largest amplitude inside; doubt speeds left out."""
+    own, speeds = found.operating, found.line_speed_rpm
+    if not own.known:
+        return
+    if own.unit == "rpm" and speeds is not None and (own.lowest < speeds.min() or own.highest > speeds.max()):
+        why = f"the run-up leaves out some of the operating speeds, {own}: it covers {speeds.min():.5g} to {speeds.max():.5g} rpm"
+        yield Verdict("doubtful", why=why, remedy="Widen run_up.speeds_rpm.")
+    for line in found.lines:
+        size, rpm = found.largest_in_operation(line)
+        peak = own.at(line.peak_speed_rpm, line.engine_order)
+        here = f"{peak:.5g} {own.unit}"
+        largest = f"the largest amplitude in it is {millimetres(size)} at {rpm:.5g} rpm" if np.isfinite(size) else ""
+        name = f"engine order {line.engine_order}"
+        if line.peak_inside and not own.margin(peak):
+            remedy = "The machine runs at this resonance: judge its amplitude, or shift it."
+            yield Verdict("trusted", why=f"{name}: the peak lies inside the {own.name}, {own}: {here}", remedy=remedy)
+        elif line.peak_inside:
+            why = f"{name}: the peak lies outside the {own.name}, {own}: {here} is {own.where(peak)} it"
+            yield Verdict("trusted", why=f"{why}, and {largest}" if largest else why, remedy=MARGIN)
+        elif largest:
+            yield Verdict("trusted", why=f"{name}: no resonance inside the speeds; of the {own.name}, {own}, {largest}")
 
 
 def _of_line(label: str, found: RunUp, line: Line) -> Iterator[Verdict]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyses.facts import NOTE
-from stickslip.analyses.operation import asked_of, of_speeds
+from stickslip.analyses.operation import asked_of, ends_of
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
 from stickslip.analyses.waves.records import Campbell, Unfollowed, WaveBranches, Wheel
 from stickslip.analyses.waves.solve import Question, follow_wave, in_still_fluid
@@ -38,7 +38,6 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Ve
     waves: tuple[WaveBranches, ...] = tuple(solved.records)
     wheel = Wheel(int(facts["sectors"]), bool(solved.notes[NOTE]["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
-    operating = of_speeds(asked_of(solved.case))
     unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel))
     found = Campbell(
         **facts,
@@ -46,8 +45,7 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Campbell, list[Ve
         waves=waves,
         engine_orders=np.array(asked.engine_orders),
         unfollowed=tuple(Unfollowed(engine_order=m, from_rpm=rpm) for m, rpm in beyond),
-        operating_lowest_rpm=operating.lowest,
-        operating_highest_rpm=operating.highest,
+        **ends_of(asked_of(solved.case)),
     )
     return found, [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves), *in_operation(found)]
 

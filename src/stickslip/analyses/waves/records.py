@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stickslip.analyses.facts import ModelFacts
-from stickslip.analyses.operation import Operating
+from stickslip.analyses.operation import InOperation, Met
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.column import column, rows
 from stickslip.errors import input_error
@@ -116,20 +116,22 @@ class Unfollowed:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Campbell(ModelFacts):
+class Campbell(ModelFacts, InOperation):
     """Campbell diagram of a case."""
 
     speeds_rpm: FloatArray = column("rpm", "speed of the rotor", "speed_rpm", along="speed")
     waves: tuple[WaveBranches, ...] = rows("wave")
     engine_orders: IntArray = column("1", "engine order whose crossings are looked for", along="order")
     unfollowed: tuple[Unfollowed, ...] = rows("unfollowed", "unfollowed_", always=True)
-    operating_lowest_rpm: float = column("rpm", "lowest operating speed, NaN without one", default=np.nan)
-    operating_highest_rpm: float = column("rpm", "highest operating speed", default=np.nan)
 
     @property
-    def operating(self) -> Operating:
-        """Operating speeds."""
-        return Operating(self.operating_lowest_rpm, self.operating_highest_rpm, "rpm")
+    def met(self) -> list[Met]:
+        """All crossings by name."""
+        names = labels(self)
+        return [
+            Met(f"EO {c.engine_order} with {names[w]}, mode {c.mode + 1}", c.engine_order, c.speed_rpm)
+            for w, c in self.crossings
+        ]
 
     @property
     def crossings(self) -> list[tuple[int, Crossing]]:
@@ -208,12 +210,22 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Interference(ModelFacts):
+class Interference(ModelFacts, InOperation):
     """SAFE diagram of a case."""
 
     waves: tuple[WaveModes, ...] = rows("wave")
     margin_percent: float = column("%", "margin of a near resonance")
     pairs: tuple[Pair, ...] = rows("pair", "pair_")
+
+    @property
+    def met(self) -> list[Met]:
+        """All pairs that meet at some speed, by name."""
+        names = labels(self)
+        return [
+            Met(f"EO {p.engine_order} with {names[p.wave]}, mode {p.mode + 1}", p.engine_order, p.resonance_rpm)
+            for p in self.pairs
+            if np.isfinite(p.resonance_rpm)
+        ]
 
 
 OfWaves = Modes | Campbell | Flutter | Interference

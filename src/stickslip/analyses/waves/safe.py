@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.analyses.operation import asked_of, ends_of
 from stickslip.analyses.waves.analysis import solved_by, wave_analysis
 from stickslip.analyses.waves.records import Interference, Pair, WaveModes, Wheel
 from stickslip.analyses.waves.solve import Question, in_still_fluid, solve_wave
 from stickslip.analyses.waves.tables import SafeTable
-from stickslip.analyses.waves.verdicts import safe_doubts, safe_tables
+from stickslip.analyses.waves.verdicts import safe_doubts, safe_in_operation, safe_tables
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
@@ -24,11 +25,13 @@ def _answer(solved: Solved, facts: Mapping[str, Any]) -> tuple[Interference, lis
     waves: tuple[WaveModes, ...] = tuple(solved.records)
     asked: SafeTable = solved.case.settings.safe
     sectors = int(facts["sectors"])
-    found = Interference(**facts, waves=waves, margin_percent=asked.margin_percent)
+    operating = ends_of(asked_of(solved.case))
+    found = Interference(**facts, waves=waves, margin_percent=asked.margin_percent, **operating)
     if not {w.wave_number for w in waves} >= set(Wheel(sectors, parted=False).numbers()):
         return found, []  # no solution
     met = interference(waves, sectors, asked, float(facts["speed_rpm"]) * RPM)
-    return replace(found, pairs=_pairs(waves, met)), list(safe_doubts(met))
+    found = replace(found, pairs=_pairs(waves, met))
+    return found, [*safe_doubts(met), *safe_in_operation(found)]
 
 
 def interference(waves: Sequence[WaveModes], sectors: int, asked: SafeTable, speed: float) -> Safe:
@@ -86,13 +89,16 @@ def _inputs(case: Case, model: Model) -> Question:
     return Question(still, asked.contacts, wheel, numbers, asked.modes, (at,), rpm=rpm, left_out=left_out)
 
 
-SAFE = wave_analysis(
-    "safe",
-    SafeTable,
-    WaveModes,
-    _inputs,
-    solved_by(solve_wave),
-    _answer,
-    (Interference, safe_tables),
-    compared=frozenset({"engine_orders", "margin_percent"}),
+SAFE = replace(
+    wave_analysis(
+        "safe",
+        SafeTable,
+        WaveModes,
+        _inputs,
+        solved_by(solve_wave),
+        _answer,
+        (Interference, safe_tables),
+        compared=frozenset({"engine_orders", "margin_percent"}),
+    ),
+    shared=("operation",),
 )

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.columns import record_of, told_apart
-from stickslip.analyses.operation import MARGIN
+from stickslip.analyses.operation import of_resonances
 from stickslip.analyses.waves.records import (
     Campbell,
     Flutter,
@@ -134,24 +134,19 @@ def campbell_doubts(
 def in_operation(found: Campbell) -> Iterator[Verdict]:
     """Note the crossings within the operating speeds, or the margin of the nearest one; doubt speeds outside the diagram."""
     own, rpm = found.operating, found.speeds_rpm
-    if not own.known:
-        return
-    if own.lowest < rpm.min() or own.highest > rpm.max():
+    if own.unit == "rpm" and (own.lowest < rpm.min() or own.highest > rpm.max()):
         why = f"the operating speeds, {own}, reach beyond the diagram, {rpm.min():.5g} to {rpm.max():.5g} rpm"
         yield Verdict("doubtful", why=why, remedy="Widen campbell.speeds_rpm.")
-    names = labels(found)
-    met = sorted(found.crossings, key=lambda one: abs(own.margin(one[1].speed_rpm)))
-    told = [f"EO {c.engine_order} with {names[w]}, mode {c.mode + 1} at {c.speed_rpm:.5g} rpm" for w, c in met]
-    inside = [text for text, (_, c) in zip(told, met, strict=True) if not own.margin(c.speed_rpm)]
-    if inside:
-        why = f"{counted(len(inside), 'crossing')} inside the operating speeds, {own}: {', '.join(inside)}"
-        yield Verdict(
-            "trusted", why=why, remedy="The machine runs at these resonances: judge their amplitudes, or shift them."
-        )
-    elif met:
-        where = own.where(met[0][1].speed_rpm)
-        why = f"no crossing lies in the operating speeds, {own}; the nearest is {where} them, {told[0]}"
-        yield Verdict("trusted", why=why, remedy=MARGIN)
+    yield from of_resonances(own, found.met, "crossing")
+
+
+def safe_in_operation(found: Interference) -> Iterator[Verdict]:
+    """Note the resonances within the operating range, or the margin of the nearest one; doubt a diagram of another speed."""
+    own, rpm = found.operating, found.speed_rpm
+    if own.known and own.unit == "rpm" and rpm is not None and own.margin(rpm):
+        why = f"the diagram is drawn at {rpm:.5g} rpm, {own.where(rpm)} the operating speeds, {own}: frequencies there are extrapolated"
+        yield Verdict("doubtful", why=why, remedy="Give safe.speed_rpm a speed at which the machine runs.")
+    yield from of_resonances(own, found.met, "resonance")
 
 
 def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float | None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.operation import answered
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, view_of
 from stickslip.analyses.waves.records import Campbell, contact_state, with_contacts
 from stickslip.analyses.waves.verdicts import in_ranges
@@ -164,7 +165,12 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     if n:
         figure.add_trace(_crossings(view))
     if view.found.operating.known:
-        shade(figure, view.found.operating.lowest, view.found.operating.highest)
+        shade(
+            figure,
+            view.found.operating.lowest,
+            view.found.operating.highest,
+            along="xy"[view.found.operating.unit == "Hz"],
+        )
     styled(figure, 620)
     span = float(np.ptp(rpm))
     figure.update_xaxes(title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span])
@@ -174,7 +180,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, {with_contacts('in the frame that turns with the wheel', view.found.contacts)}. "
-        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{' Shaded: the operating speeds.' * view.found.operating.known}{_not_shown(view, top)}"
+        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{f' Shaded: the {view.found.operating.name}.' * view.found.operating.known}{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 
@@ -192,8 +198,8 @@ def crossings(view: Waves[Campbell]) -> Table | Words:
     head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
     own = view.found.operating
     if own.known:
-        met = sorted(c.speed_rpm for _, c in view.found.crossings)
-        head, rows = [*head, "operating speeds"], [[*row, own.where(rpm)] for row, rpm in zip(rows, met, strict=True)]
+        met = [own.at(one.rpm, one.order) for one in sorted(view.found.met, key=lambda one: one.rpm)]
+        head, rows = [*head, own.name], [[*row, own.where(at)] for row, at in zip(rows, met, strict=True)]
     return Table(head, rows, title)
 
 
@@ -208,7 +214,9 @@ def _cards(view: Waves[Campbell]) -> list[Card]:
     told += [f"and {len(met) - _MOST_TOLD} more"] * (len(met) > _MOST_TOLD)
     count, noun = counted(len(met), "crossing").split(" ")
     note = "; ".join(filter(None, (", ".join(told), contact_state(view.found.contacts))))
-    return [Card(count if met else "No", f"{noun if met else 'crossing'} with engine orders {over}", note)]
+    operating = answered(view.found.operating, view.found.met, "crossing")
+    first = [Card(*operating)] if operating else []
+    return [*first, Card(count if met else "No", f"{noun if met else 'crossing'} with engine orders {over}", note)]
 
 
 _NEEDS = (*NEEDED, "speed_rpm")

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.operation import answered
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
 from stickslip.analyses.waves.records import Interference, Pair, contact_state, hertz, with_contacts
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.content import Table
-from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled
+from stickslip.report.plot import ALARM, GRID, INK, MUTED, Plot, ring, shade, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 
@@ -59,6 +60,7 @@ def safe_diagram(view: Waves[Interference]) -> Plot:
     )
     unjudged = {pair.engine_order for pair in found.pairs if pair.judged is False}
     figure.add_trace(_orders(orders, unjudged, sectors, turns))
+    shaded = _shade_operation(figure, view, orders)
     near = [pair for pair in found.pairs if pair.near]
     if near:
         figure.add_trace(_near(view, near))
@@ -80,7 +82,23 @@ def safe_diagram(view: Waves[Interference]) -> Plot:
             f" **Not judged** (crossed squares): {', '.join(f'EO {m}' for m in sorted(unjudged))}, above the highest "
             "computed mode of the nodal diameter."
         )
-    return Plot(f"safe{view.key}", "SAFE diagram", caption, figure)
+    return Plot(f"safe{view.key}", "SAFE diagram", caption + shaded, figure)
+
+
+def _shade_operation(figure: go.Figure, view: Waves[Interference], orders: IntArray) -> str:
+    """Shade the operating frequencies, of speeds those of each engine order; return the sentence for the caption."""
+    own, sectors = view.found.operating, view.sectors
+    if not own.known:
+        return ""
+    if own.unit == "Hz":
+        shade(figure, own.lowest, own.highest, along="y")
+        return " Shaded: the operating range."
+    for order in orders:
+        folded = abs(order - sectors * round(order / sectors))
+        low, high = (order * rpm / 60 for rpm in (own.lowest, own.highest))
+        ends = {"x0": folded - 0.3, "x1": folded + 0.3, "y0": low, "y1": high}
+        figure.add_shape(type="rect", **ends, fillcolor=GRID, opacity=0.7, line_width=0, layer="below")
+    return f" Shaded: what the engine orders excite at the operating speeds, {own}."
 
 
 def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) -> go.Scatter:
@@ -166,13 +184,15 @@ def _cards(view: Waves[Interference]) -> list[Card]:
     state = contact_state(found.contacts)
     within = f"within {number(found.margin_percent)} % of {number(view.rpm, 5)} rpm"
     near = sorted((pair for pair in found.pairs if pair.near), key=lambda pair: abs(pair.margin))
+    operating = answered(found.operating, found.met, "resonance")
+    before = [Card(*operating)] if operating else []
     if not near:
-        return [Card("No", f"near resonance {within}", ", ".join(filter(None, (_nearest(view), state))))]
+        return [*before, Card("No", f"near resonance {within}", ", ".join(filter(None, (_nearest(view), state))))]
     first, *others = (_met(view, pair) for pair in near)
     more = [f"{counted(len(near), 'near resonance')} {within}", *others[: _MOST_TOLD - 1]]
     more += [f"and {len(near) - _MOST_TOLD} more"] * (len(near) > _MOST_TOLD)
     rpm = f"{number(view.rpm * (1 + near[0].margin), 5)} rpm"
-    return [Card(rpm, f"{first}", "; ".join(filter(None, (", ".join(more), state))))]
+    return [*before, Card(rpm, f"{first}", "; ".join(filter(None, (", ".join(more), state))))]
 
 
 def _met(view: Waves[Interference], pair: Pair) -> str:

@@ -143,11 +143,12 @@ class Operation(Section):
     """Where the machine runs. Answers say whether a resonance lies there, and the margin if not; nothing else depends on it."""
 
     operating_hz: Range | None = Field(
-        None, description="operating range [lowest, highest] of the excitation in Hz, for [forced_response]"
+        None,
+        description="operating range [lowest, highest] of the excitation in Hz, for [forced_response], [campbell], [safe] and [run_up]",
     )
     operating_rpm: Range | None = Field(
         None,
-        description="operating speeds [lowest, highest] in rpm, for [campbell], and for [forced_response] with an engine order",
+        description="operating speeds [lowest, highest] in rpm, for [campbell], [safe] and [run_up], and for [forced_response] with an engine order",
     )
 
     @model_validator(mode="after")
