@@ -60,6 +60,17 @@ def test_tables_of_21_constants_are_stiffness_or_flexibility(tmp_path, label, op
     assert ansys_passed_over(tmp_path / "cube.cdb") == ()
 
 
+@pytest.mark.parametrize(
+    ("label", "option"), [("ELAS", ""), ("ELAS", "ISOT"), ("ELAS", "OELM"), ("HYPE", "AELS"), ("ANEN", "0")]
+)
+def test_tables_that_are_not_read_are_refused_by_name(tmp_path, label, option):
+    (tmp_path / "cube.cdb").write_text(PLAIN + table(np.eye(6), option=option, label=label))
+    with pytest.raises(
+        InputError, match=rf"gives a material by a table \(TB,{label}\), and of these only ANEL and ELAS"
+    ):
+        ansys_passed_over(tmp_path / "cube.cdb")
+
+
 def test_isotropic_constants_written_out_stay_isotropic(tmp_path):
     same = {"EX": 210e3, "EY": 210e3, "EZ": 210e3, "PRXY": 0.3, "PRYZ": 0.3, "PRXZ": 0.3, "GXY": 210e3 / 2.6}
     (found,) = materials(tmp_path, PLAIN + constants(same)).values()

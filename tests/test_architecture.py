@@ -70,6 +70,7 @@ class Written(NamedTuple):
     functions: list[int]  # their lines of code, methods too
     constants: list[str]  # names assigned at the top
     refusals: list[tuple[str, int, str, str]]  # file, line, place and what is wrong with it
+    fields: list[tuple[str, int, str]]  # file, line and field of refused geometry
 
 
 @cache
@@ -78,11 +79,12 @@ def written(path: Path) -> Written:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     nodes = list(ast.walk(tree))
     assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
-    calls = [n for n in nodes if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "input_error"]
+    calls = [n for n in nodes if isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("input_error", "_bad")]
     return Written(
         [body_lines(node) for node in nodes if isinstance(node, ast.FunctionDef)],
         [n.id for a in assigned for n in ast.walk(a) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)],
-        [(path.name, node.lineno, *map(literal, node.args[:2])) for node in calls],
+        [(path.name, node.lineno, *map(literal, node.args[-3:-1])) for node in calls],
+        [(path.name, n.lineno, literal(n.args[-3])) for n in calls if getattr(n.func, "id", "") == "_bad"],
     )
 
 
@@ -218,6 +220,9 @@ def test_refusals_name_the_place_before_they_say_what_is_wrong_with_it():
     found = [refusal for path in MODULES for refusal in written(path).refusals]
     assert sum(bool(VERBS.search(what)) for *_, what in found) > len(found) / 2
     assert [one for one in found if VERBS.search(one[2])] == []
+    fields = [field for path in MODULES for field in written(path).fields]
+    assert len(fields) > 15
+    assert [one for one in fields if not re.fullmatch(r"[a-z_.{}]+", one[2])] == []
 
 
 def test_public_names_have_docstrings():

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from stickslip.errors import InputError
-from stickslip.model.checksum import LENGTH, add_checksum, checked, with_checksum
+from stickslip.model.checksum import LENGTH, MIN_MARK_BYTES, Cut, add_checksum, checked, with_checksum
 from stickslip.model.structure import Dofs, Structure
 from stickslip.model.structure_file import load_structure, save_structure
 from stickslip.study.store.archive import PartStore
@@ -43,6 +43,18 @@ def test_content_of_other_programs_is_read_unless_a_checksum_has_to_be_there() -
     assert checked(b"abc\n", required=False) == b"abc\n"
     with pytest.raises(ValueError, match="has no checksum"):
         checked(b"abc\n")
+
+
+@pytest.mark.parametrize("content", [b"", b"abc", bytes(3 * LENGTH)])
+def test_a_cut_within_the_checksum_is_told_at_every_byte(content: bytes) -> None:
+    whole = with_checksum(content)
+    for cut in range(1, LENGTH - MIN_MARK_BYTES + 1):
+        for required in (True, False):
+            with pytest.raises(Cut, match="cut off within the checksum"):
+                checked(whole[:-cut], required=required)
+    # what is left of the mark may belong to the content
+    for cut in range(LENGTH - MIN_MARK_BYTES + 1, LENGTH + 1):
+        assert checked(whole[:-cut], required=False) == whole[:-cut]
 
 
 def test_a_damaged_part_is_made_anew_with_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

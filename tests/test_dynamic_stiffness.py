@@ -68,6 +68,23 @@ def test_load_refuses_what_is_no_harmonic():
     assert np.array_equal(load.coefficients(1)[1], np.zeros(3))
 
 
+def test_products_share_their_stiffness_at_one_frequency_with_the_same_harmonics():
+    """What is kept of one of them is used for another: at another frequency the product is another one."""
+    rng = np.random.default_rng(2)
+    stiffness = rng.standard_normal((6, 6))
+    structure = lumped(np.eye(6), stiffness @ stiffness.T + np.eye(6), 0.01 * np.eye(6))
+    linear = condense(structure, RETAINED, HarmonicLoad(np.ones(6)))
+    at, q = linear.products(OMEGA, (0, 1, 2)), rng.standard_normal((5, 3))
+    other_load = linear.with_load(HarmonicLoad(2.0 * np.ones(6))).products(OMEGA, (0, 1, 2))
+    assert at.same(other_load)
+    np.testing.assert_array_equal(other_load.product(q), at.product(q))
+    for other in (linear.products(1.001 * OMEGA, (0, 1, 2)), linear.with_mass_damping(0.1).products(OMEGA, (0, 1, 2))):
+        assert not at.same(other)
+        assert np.abs(other.product(q) - at.product(q)).max() > 1e-4
+    assert not at.same(linear.products(OMEGA, (0, 1, 3)))
+    assert not at.same(linear)
+
+
 @pytest.mark.parametrize("retained", [[-2], [True, False], [0, 0], [0, 2], [0.0]])
 def test_only_different_dofs_are_retained(retained):
     structure = lumped(np.ones(2), np.array([[2.0, -1.0], [-1.0, 2.0]]))

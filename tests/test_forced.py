@@ -13,6 +13,8 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.continuation import starting_solutions
 from stickslip.response.continuation.branch import BACKWARD
 from stickslip.response.forced import from_time
+from stickslip.response.forced.passages import _solution
+from stickslip.response.forced.problem import forced_point
 from stickslip.response.forced.response import Sweep, accepted_pairs, accepted_points, forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 
@@ -49,6 +51,30 @@ def test_damper_optimisation_curve(limit, peak, omega):
     # sampling of the contact (512) and a bracket of 5e-4 of the frequency: second order in both at a smooth maximum
     assert height == pytest.approx(peak, rel=5e-4)
     assert where == pytest.approx(omega, rel=1e-3)
+
+
+@pytest.mark.parametrize("best", ["start", "tried"])
+def test_newtons_method_begins_with_the_smallest_residual(best):
+    """The solution itself is among the starts: nothing is left to do."""
+    system, load = griffin(0.1)
+    problem = forced_problem(system, load, Sweep(omega_range=(0.8, 1.3), samples=512, high=3))
+    balance = problem.high
+
+    def solved(omega):
+        solution = newton(lambda v: balance.linearise(v, omega), np.zeros(balance.size), Newton(tolerance=1e-12))
+        return forced_point(balance, solution, "high", 0, omega, 0.0)
+
+    far, exact = solved(0.8), solved(1.1)
+    assert far.converged
+    assert exact.converged
+    if best == "start":
+        tried, start = [far], exact.coefficients
+    else:
+        tried, start = [far, exact], far.coefficients
+    found = _solution(problem, balance, tried, 1.1, start)
+    assert found.status.converged
+    assert found.iterations == 0
+    np.testing.assert_allclose(found.x, balance.unknowns(exact.coefficients), rtol=0, atol=1e-12)
 
 
 def test_stuck_damper_is_a_spring():

@@ -1,6 +1,8 @@
 """Loops on the page: the six that dissipate most, the others folded away, means out of the picture; speeds and stability in its curves."""
 
 import itertools
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -9,10 +11,14 @@ from synthetic_result import provenance, synthetic_result, tree_of
 
 from stickslip.analyses.forced_response.page.at_peak.contacts import SHOWN_LOOPS, hysteresis_t
 from stickslip.analyses.forced_response.page.chapter import peaks
-from stickslip.analyses.forced_response.page.curves import frequency_response
+from stickslip.analyses.forced_response.page.curves import COMPARED, frequency_response, most
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import MOTION
 from stickslip.analyses.page import report_html
+
+
+class Case(NamedTuple):
+    index: int
 
 
 def of_ellipses(half_axes: list[float], mean: float = 0.0) -> xr.Dataset:
@@ -47,6 +53,21 @@ def test_a_mean_that_leaves_nothing_of_a_loop_to_see_is_taken_out_and_told(mean:
     assert ("mean is taken out" in shown.caption) is out
     x = np.asarray(shown.figure.data[0].x, dtype=float)[:-1]
     assert np.mean(x) == pytest.approx(0.0 if out else 1e6 * mean, abs=1e-6)  # single precision of 6 µm
+
+
+@pytest.mark.parametrize(
+    "largest", [[0.1, 5.0, 1.0, 3.0, 2.0, 4.0, 0.5, 6.0], [np.nan, 5.0, np.nan, 1.0, 1.0, 1.0, 2.0, 0.0]]
+)
+def test_the_cases_with_the_largest_value_are_compared_in_their_order(largest: list[float]) -> None:
+    """The value of a case is that of its largest point; a case with none has no place."""
+    cases = [Case(k) for k in range(len(largest))]
+    owner = np.repeat(np.arange(len(largest)), 3)
+    size = (np.array(largest)[:, None] - [0.0, 0.05, 20.0]).ravel()
+    size[::3], size[2::3] = size[2::3].copy(), size[::3].copy()
+    found = most(SimpleNamespace(cases=cases, point_case=owner), size)
+    known = sorted((k for k, value in enumerate(largest) if np.isfinite(value)), key=lambda k: largest[k])
+    assert [case.index for case in found] == sorted(known[-COMPARED:])
+    assert 0 < len(found) < len(largest)
 
 
 def test_straight_lines_are_folded() -> None:

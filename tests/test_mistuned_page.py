@@ -8,7 +8,7 @@ from synthetic_result import synthetic_result
 from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.curves import frequency_response
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.page.wheel import blades
+from stickslip.analyses.forced_response.page.wheel import blades, wheel_at_peak
 from stickslip.analyses.forced_response.verdicts.curve import Curve, peak_output
 from stickslip.assembly.sides.mistuned import listed, of_all
 
@@ -73,6 +73,29 @@ def test_a_blade_that_is_named_stays_the_one_of_the_peak() -> None:
     assert [peak_output(data, k) for k in (0, 1)] == [1, 1]
     assert view.output_name == BLADES[1]
     assert not view.mistuned
+
+
+def test_the_wheel_at_its_peak_is_drawn_at_the_instant_of_the_largest_blade_and_without_motion_as_nothing() -> None:
+    """The second case does not move; three blades of the first move with the wave 1, and with the mean."""
+    motion = np.zeros((2, 3), dtype=complex)
+    motion[0] = 1e-4j * (1.0 + 3.0 * np.exp(2j * np.pi * np.arange(3) / 3))
+    data = wheel()
+    data["blade_motion"] = ("case", "blade", "part"), np.stack([motion.real, motion.imag], axis=-1)
+    data["wave_amplitude"] = ("case", "wave"), np.abs(np.fft.fft(motion, axis=1)) / 3
+    data["localisation"] = "case", [0.5, 0.0]
+    plot = wheel_at_peak(Response(data))
+    assert plot is not None
+    sizes, instants = ([np.asarray(own.r, dtype=float) for own in plot.figure.data[k::3]] for k in (0, 1))
+    closed = np.append(motion[0], motion[0, 0])
+    assert sizes[0] / sizes[0][0] == pytest.approx(np.abs(closed) / 4e-4, rel=1e-6)
+    assert instants[0] / sizes[0][0] == pytest.approx(np.abs(closed.imag) / 4e-4, abs=1e-6)  # blade 0 moves as i
+    assert sizes[1].tolist() == instants[1].tolist() == [0.0] * 4
+    assert plot.case_captions[0].startswith(
+        "Wave 1 (1 nodal diameters) carries 90 % of the sum of squares; localisation factor 0.5 "
+    )
+    assert plot.case_captions[1].startswith(
+        "Wave 0 (0 nodal diameters) carries 0 % of the sum of squares; localisation factor 0 "
+    )
 
 
 def test_labels_of_all_blades_are_told_by_the_first_and_the_last() -> None:

@@ -16,7 +16,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, ModeSweep, nonlinear_mode
 from stickslip.response.nonlinear_modes.more_points import refined
-from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
+from stickslip.response.nonlinear_modes.passage import CELLS, Swept, _Table, passage_through_resonance
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.single_mode_validity import (
     along,
@@ -171,6 +171,22 @@ def test_a_linear_passage_is_that_of_the_quadrature(seconds):
     assert found.finished
     assert found.amplitude.max() == pytest.approx(abs(exact).max(), rel=1e-4)
     assert found.amplitude == pytest.approx(np.interp(found.time, time, abs(exact)), abs=1e-4 * abs(exact).max())
+
+
+@pytest.mark.parametrize("node", [0, 1, CELLS // 3, CELLS // 2, CELLS])
+def test_a_steady_motion_does_not_change_on_the_grid_of_a_passage(node):
+    """Any amplitude is steady at any frequency under the force that its stiffness needs; between nodes to the cell's square."""
+    own = modal_oscillator(b4(0.1), PUSH)
+    table = _Table.of(own)
+    first, last = own.ends
+    for beside, within in ((0.0, 1e-12), (0.5, 1e-6)):
+        here = own.at(np.array([min(first + (last - first) * (node + beside) / CELLS, last)]))
+        for omega in (0.9, 1.0, 1.2):
+            stiffness = here.stiffness(np.array([omega]))[0]
+            level = abs(stiffness) * here.amplitude[0] / abs(here.force[0])
+            steady = level * here.force[0] / stiffness
+            assert abs(table.slope(omega, complex(steady), level)) <= within * omega * abs(steady)
+    assert table.largest == own.at(np.array([last])).amplitude[0]
 
 
 def in_small_steps(limit, ends, seconds):

@@ -1,11 +1,15 @@
 """[modal_synthesis] in a study: levels against direct solutions, verdicts, the page, going on after an interruption."""
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from study_texts import DETACHED, JENKINS, answered, study_of
 
 import stickslip as ss
 from stickslip.analyses.modal_synthesis import analysis as solving
+from stickslip.analyses.modal_synthesis.page import _along
 from stickslip.analyses.modal_synthesis.problem import _bounded
 from stickslip.analyses.page import plots
 from stickslip.errors import InputError
@@ -30,6 +34,18 @@ NEAR = (
     .replace('on = "blade.m1"\nforce_n = 0.1', 'on = "blade.m2"\nforce_n = 0.02')
     .replace("tangential_stiffness_n_per_m = 0.5", "tangential_stiffness_n_per_m = 0.2")
 )
+
+
+def test_the_largest_difference_from_direct_solutions_is_told_with_level_and_frequency():
+    def told(*levels):
+        each = [SimpleNamespace(level=n, along_error=e, along_error_omega=w) for n, e, w in levels]
+        return _along(SimpleNamespace(found=SimpleNamespace(levels=each)))
+
+    hz = 2 * math.pi
+    assert told() == told((1.0, None, None), (2.0, math.nan, 3.0)) == ""
+    both = told((1.0, 0.02, 40.0 * hz), (2.0, -0.05, 50.0 * hz), (3.0, 0.03, 60.0 * hz), (4.0, math.nan, 70.0 * hz))
+    assert both == " Full lines differ from them around the peaks by up to 5 %, at level 2 and 50 Hz."
+    assert told((1.0, 0.02, None)).endswith("by up to 2 %, at level 1 and – Hz.")
 
 
 def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):

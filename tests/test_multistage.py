@@ -1,8 +1,10 @@
 """Wheels of different numbers of sectors, coupled by spatial harmonics, against all sectors of both tied node by node."""
 
+import logging
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from cyclic_models import wedge
 
 import stickslip as ss
 from stickslip.analyses.waves.records import WaveModes
-from stickslip.analyses.waves.stages import flange_doubts, unreached
+from stickslip.analyses.waves.stages import each_diameter, flange_doubts, unreached
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -74,6 +76,22 @@ def tied(stages):
 
 def flange(stages, harmonics):
     return Flange(("first", "second"), tuple(s.structure.dof_set("flange") for s in stages.values()), tuple(harmonics))
+
+
+def test_a_nodal_diameter_that_is_done_is_told_with_its_lowest_and_highest_frequency(stages, caplog):
+    caplog.set_level(logging.INFO, logger="stickslip")
+    assembly = multistage(stages, [flange(stages, (0, 1))])
+    notes = SimpleNamespace(get=lambda _: "known")
+    asked = SimpleNamespace(assembly=assembly, numbers=(0, 1), n_modes=3)
+    done = list(each_diameter(asked, [], notes))
+    again = list(each_diameter(asked, done[:1], notes))
+    assert [one.wave_number for one in done + again] == [0, 1, 1]
+    told = [
+        f"nodal diameter {w.wave_number}: {w.frequencies_hz[0]:.6g} to {w.frequencies_hz[2]:.6g} Hz in" for w in done
+    ]
+    records = [(r.fraction, r.getMessage().rpartition(" ")[0].rpartition(" ")[0]) for r in caplog.records]
+    assert records == [(0.5, told[0]), (1.0, told[1]), (1.0, told[1])]
+    assert done[0].frequencies_hz[0] < 0.9 * done[0].frequencies_hz[2]
 
 
 @pytest.mark.validation

@@ -133,6 +133,26 @@ def test_slip_begins_where_the_motion_slips_and_not_where_a_slider_shakes_down()
     assert slip_amplitude(problem) == pytest.approx(0.2, rel=0.03)
 
 
+@pytest.mark.parametrize("kind", ["structural damping", "Coriolis forces"])
+def test_the_slope_by_a_mass_damping_is_that_of_differences_where_the_interior_is_not_diagonal(kind):
+    rng = np.random.default_rng(4)
+    chain = small_chain()
+    body, skew = chain.structure, 0.3 * rng.standard_normal((20, 20))
+    other = (
+        {"loss": 0.02 * body.stiffness} if kind == "structural damping" else {"damping": body.damping + skew - skew.T}
+    )
+    chain = replace(chain, structure=replace(body, **other))
+    how = Discretisation(order=3)
+    plain = self_excited_motions(chain, HarmonicLoad(np.zeros(20)), stuck_modes(chain, 1)[0], 19, how).balance
+    assert known_by_vectors(plain.linear) is None
+    x = rng.standard_normal(plain.size)
+    for rate in (0.0, -0.3):
+        linears = [plain.linear.with_mass_damping(rate + d) for d in (-1e-4, 0.0, 1e-4)]
+        before, _, after = (replace(plain, linear=own).linear_residual(x, 7.0) for own in linears)
+        slope = replace(plain, linear=linears[1]).by_mass_damping(x, 7.0, lambda h: body.of_harmonic(h).mass)
+        np.testing.assert_allclose(slope, (after - before) / 2e-4, rtol=0, atol=1e-7 * np.max(np.abs(slope)))
+
+
 def test_residuals_without_condensed_matrices_are_those_with_them():
     """Trials of a corrector are evaluated by products with vectors; damping by mass adds the same force either way."""
     rng = np.random.default_rng(4)

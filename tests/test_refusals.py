@@ -291,6 +291,15 @@ def two_faces(axis: Axis | None) -> CyclicSector:
             ),
             "WedgeDamper.right_angle: is upright like the left side: the two never meet. Incline one.",
         ),
+        (lambda: Axis((1.0, 0.0)), "Axis.direction: needs three numbers, got (1.0, 0.0). Give x, y, z."),
+        (lambda: Axis((1.0, 0.0, 0.0, 0.0)), "Axis.direction: needs three numbers, got (1.0, 0.0, 0.0, 0.0). Give x,"),
+        (lambda: Axis((1.0, 0.0, math.inf)), "Axis.direction: needs three numbers, got (1.0, 0.0, inf). Give x, y, z."),
+        (lambda: Axis(origin=(1.0,)), "Axis.origin: needs three numbers, got (1.0,). Give x, y, z."),
+        (
+            lambda: Axis(origin=(0.0, math.nan, 0.0)),
+            "Axis.origin: needs three numbers, got (0.0, nan, 0.0). Give x, y,",
+        ),
+        (lambda: Axis((0.0, 0.0, 0.0)), "Axis.direction: has no length. The z axis is (0, 0, 1)."),
         (
             lambda: rotating_solid(TETRAHEDRON, STEEL).at_speed(1.0, tangent="textbok"),
             "RotatingSolid.at_speed: there is no tangent 'textbok'. Did you mean 'textbook'?",

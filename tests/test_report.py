@@ -1,6 +1,7 @@
 """The report: opened in a browser, checked against the data, and tried on results that lack parts."""
 
 import json
+import math
 import re
 import sys
 from collections.abc import Callable
@@ -31,7 +32,9 @@ from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.inputs import Varied, as_run, inputs, told
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.pictures import edges, reduction, skin_picture
+from stickslip.api.as_tables import as_tables
 from stickslip.api.model import Model
+from stickslip.assembly.forces import Load
 from stickslip.errors import InputError
 from stickslip.report.content import Table
 from stickslip.report.frame import Chapter, Placing, page_html
@@ -1090,6 +1093,38 @@ def test_the_page_of_a_python_model_tells_its_loads(tmp_path: Path) -> None:
     assert "slip limit 200 mN" in text
     assert "frequency 0.1 to 0.3 Hz" in text
     assert "shaker.xmotion along x of node set or dof blade.m1" in text
+
+
+def test_the_tables_of_a_python_model_have_the_units_of_their_keys(tmp_path: Path) -> None:
+    """All that `as_tables` converts: frequencies in Hz, phases in degrees, speeds in rpm, gaps by their sign."""
+    model = study_of(JENKINS, tmp_path).model()
+    damper, law = model.contacts["damper"], model.contacts["damper"].law
+    loads = {
+        "plain": Load(on="blade.m1", newton=0.5),
+        "own": Load(on="blade.m1", newton=-2.0, harmonic=2, phase=math.pi / 2, omega=100 * math.pi),
+        "ratio": Load(on="blade.m1", newton=1.0, omega_ratio=1.5, engine_order=3, direction=(0.0, -1.0, 0.0)),
+        "oblique": Load(on="blade.m1", newton=1.0, harmonic=0, direction=(0.6, 0.0, 0.8)),
+    }
+    contacts = {
+        "open": replace(damper, gap=1e-4, law=replace(law, limit=0.3)),
+        "pressed": replace(damper, gap=-2e-4, preload=5.0, law=replace(law, limit=0.4)),
+    }
+    found = as_tables(replace(model, loads=loads, contacts=contacts, retention=3.0), "modes", {"number": 4})
+    assert found["load"] == {
+        "plain": {"force_n": 0.5, "on": "blade.m1", "harmonic": 1},
+        "own": {"force_n": -2.0, "on": "blade.m1", "harmonic": 2, "phase_deg": 90.0, "frequency_hz": 50.0},
+        "ratio": {
+            "force_n": 1.0, "on": "blade.m1", "harmonic": 1, "direction": "-y", "engine_order": 3, "frequency_ratio": 1.5,
+        },
+        "oblique": {"force_n": 1.0, "on": "blade.m1", "harmonic": 0, "direction": [0.6, 0.0, 0.8]},
+    }  # fmt: skip
+    stuck = {"between": list(damper.between), "law": "jenkins", "tangential_stiffness_n_per_m": law.k_t}
+    assert found["contact"] == {
+        "open": {**stuck, "slip_limit_n": 0.3, "gap_m": 1e-4},
+        "pressed": {**stuck, "slip_limit_n": 0.4, "interference_m": 2e-4, "preload_n": 5.0},
+    }
+    assert found["retention"] == {"stiffness_n_per_m": 3.0}
+    assert found["modes"] == {"number": 4}
 
 
 def test_every_table_of_a_study_has_a_row_with_its_keys() -> None:

@@ -1,6 +1,7 @@
 """Bounds over the tractions of contacts that stick: benchmark B8, brute force, motions in time, other laws."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,14 +11,16 @@ from evidence.validation.case_b8_residual_traction import TABLE, y2
 from stickslip import CoupledCoulomb, CubicSpring, Interface, Iwan, Jenkins, RigidCoulomb, UnilateralSpring
 from stickslip.contact.element import element, element_step
 from stickslip.errors import InputError
+from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions import TractionSearch, confirmed, resonance_bounds, traction_bounds
-from stickslip.response.residual_tractions.bounds import _at, _setup, may_be_several
+from stickslip.response.residual_tractions.bounds import _at, _setup, crossings, may_be_several
 from stickslip.response.residual_tractions.search import sliders_at
 from stickslip.response.system import System
 from stickslip.response.time.start import TransientStart
 from stickslip.response.time.transient import TimeStepping, integrate
+from stickslip.solve.newton_method import Newton
 from stickslip.units import HZ
 
 ON_SAMPLES = Discretisation(order=5, samples=256, evaluator="intervals")
@@ -186,6 +189,34 @@ def test_bounds_hold_the_motions_of_other_branches():
     end = np.sqrt((k + np.sqrt(k**2 + 4 * m * slope * (force / c) ** 2)) / (2 * m))
     assert [b.branches for b in known] == [3 if b.omega < end else 1 for b in known]
     assert top.most.amplitude == pytest.approx(force / (c * end), rel=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("converged", "places", "count"),
+    [
+        ((True, True), (105.0, 125.0), 1),
+        ((True, True), (125.0, 105.0), 1),
+        ((True, True), (115.0, 125.0), 1),
+        ((True, True), (115.0, 115.0), 1),
+        ((True, True), (115.5, 125.0), 0),
+        ((True, True), (105.0, 114.5), 0),
+        ((False, True), (105.0, 125.0), 0),
+        ((True, False), (105.0, 125.0), 0),
+        ((False, False), (105.0, 125.0), 0),
+    ],
+)
+def test_a_branch_crosses_a_frequency_between_two_solutions_that_converged(converged, places, count):
+    made = system(lumped(np.eye(1), 2.0 * np.eye(1), 1e4 * np.eye(1)), [Jenkins(k_t=1e2, limit=1e-6)], np.eye(3, 1))
+    load = HarmonicLoad(np.zeros(1), {1: np.array([2.0 + 0j])})
+    balance = harmonic_balance(made.condensed(load, 1, np.array([0])), made.interface, 1, 64)
+    ends = [
+        SimpleNamespace(converged=c, p=p, point=SimpleNamespace(x=np.zeros(3)))
+        for c, p in zip(converged, places, strict=True)
+    ]
+    found = list(crossings([ends], balance, 115.0, Newton()))
+    assert len(found) == count
+    for x in found:
+        assert np.linalg.norm(balance.linearise(x, 115.0).residual) < 1e-8
 
 
 def test_friction_under_a_constant_normal_load_is_not_swept():

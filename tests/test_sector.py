@@ -275,3 +275,22 @@ def test_what_gmsh_cannot_mesh_is_told(error: Exception, said: str, monkeypatch:
         mesh_sector(SHROUDED)
     assert str(caught.value) == said
     assert (caught.value is error) == isinstance(error, StickslipError)
+
+
+@pytest.mark.parametrize("worst", [1.0, 0.5, -0.2])
+def test_elements_are_refused_below_a_share_of_the_regular_tetrahedron(worst: float) -> None:
+    """A regular one has the quality 1; lower by a factor, it has that factor, as long as its longest edge lies in its base."""
+    base = np.array([[np.cos(a), np.sin(a), 0.0] for a in 2 * np.pi / 3 * np.arange(3)])
+    apex = np.array([[0.0, 0.0, math.sqrt(2)]])
+    regular = np.vstack([base, apex])
+
+    def lowered(factor: float) -> np.ndarray:
+        return regular * [1.0, 1.0, factor]
+
+    cells = np.array([[0, 1, 2, 3], [4, 5, 6, 7]])
+    sector_mesh._check_shapes(np.vstack([regular, lowered(1.001 * sector_mesh.FLATTEST)]), cells)
+    for factor in (0.999 * sector_mesh.FLATTEST, worst * sector_mesh.FLATTEST / 2, -1.0):
+        points = np.vstack([regular, lowered(factor)])
+        with pytest.raises(StickslipError, match=rf"an element of quality {factor:.3g} at \[") as told:
+            sector_mesh._check_shapes(points, cells)
+        assert str(told.value).endswith("; change the element sizes slightly")

@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import xarray as xr
 from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.analyses.forced_response import analysis
+from stickslip.analyses.forced_response.chooser import _audited
 from stickslip.analyses.forced_response.page.errors import errors
 from stickslip.analyses.forced_response.page.harmonics import choice, kept_harmonics
 from stickslip.analyses.forced_response.page.response import Response
@@ -77,6 +79,9 @@ def run(study: Study, *checks: str) -> Ran:
     return Ran(data.assign_attrs(root | data.attrs), "\n".join([*lines, *map(str, outcome.verdicts)]))
 
 
+NAN = float("nan")
+
+
 def forget_after(study: Study, kept: int) -> int:
     """Leave the first points of a run in its journal, as a killed one does; return how many there were."""
     (sealed,) = (study.folder / "jobs").glob("*.job")
@@ -88,6 +93,42 @@ def forget_after(study: Study, kept: int) -> int:
     db.close()
     sealed.rename(sealed.with_suffix(".part"))
     return len(rows)
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ([], ""),
+        (
+            [(0.01, 0.5, False)],
+            "; audits: 1 point solved again with more harmonics, which changed the motion by at most 1 %",
+        ),
+        (
+            [
+                (0.01, NAN, False),
+                (0.02, 0.3, True),
+                (NAN, NAN, True),
+                (NAN, 0.5, True),
+                (NAN, 0.03, False),
+                (NAN, 0.04, False),
+            ],
+            (
+                "; audits: 2 points solved again with more harmonics, which changed the motion by at most 2 %"
+                "; 2 points exact, as no force acts on the harmonics left out"
+                "; 2 points judged by prediction alone, of at most 4 %"
+            ),
+        ),
+        ([(NAN, NAN, False), (NAN, 0.03, False)], "; 1 point judged by prediction alone, of at most 3 %"),
+        ([(NAN, NAN, True)], "; 1 point exact, as no force acts on the harmonics left out"),
+    ],
+)
+def test_what_is_known_of_the_points_is_counted(points, said):
+    every = [
+        SimpleNamespace(point=SimpleNamespace(converged=True), audit_error=audit, own_error=own, exact=exact)
+        for audit, own, exact in points
+    ]
+    lost = SimpleNamespace(point=SimpleNamespace(converged=False), audit_error=0.5, own_error=0.5, exact=True)
+    assert _audited(SimpleNamespace(accepted=[*every, lost])) == said
 
 
 def test_study_and_library_have_one_default(base: Study) -> None:

@@ -59,6 +59,12 @@ def test_many_errors_are_told_in_two_kilobytes_and_counted() -> None:
     assert r"wrong \x1b[31m 0" in lines[0]
 
 
+def test_an_error_is_one_line_whatever_the_names_in_it() -> None:
+    error = input_error("a\nb.toml", "names\tc\nd", "Do\ne.")
+    assert str(error) == r"a\nb.toml: names\tc\nd. Do\ne."
+    assert str(together([error, error])).splitlines() == [str(error)] * 2
+
+
 def test_all_that_is_wrong_of_harmonics_and_variations_is_told(tmp_path: Path) -> None:
     wrong = {
         "harmonics.high": "3",

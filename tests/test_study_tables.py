@@ -76,6 +76,31 @@ def test_an_empty_table_builds_the_dataclass_with_its_defaults(cls):
     assert made == expected
 
 
+def test_a_table_bears_the_name_of_its_dataclass_or_its_own():
+    assert table_of(BladePair).__name__ == "BladePair"
+    assert table_of(BladePair, name="PrismBlades").__name__ == "PrismBlades"
+    named_after = {"Airfoil", "DiskProfile", "FirstLoading", "FourParameter", "Platform", "Shroud", "UniformBand"}
+    assert named_after <= json.loads(json_schema())["$defs"].keys()
+
+
+def lists_of(schema: object, key: str = "") -> list[tuple[str, dict]]:
+    """Return the keys of a JSON schema whose value is a list that may not be empty, with what is asked of it."""
+    if isinstance(schema, list):
+        return [found for own in schema for found in lists_of(own, key)]
+    if not isinstance(schema, dict):
+        return []
+    own = [(key, schema)] if schema.get("type") == "array" and schema.get("minItems", 0) > 0 else []
+    names = {k: key if k in ("anyOf", "items", "additionalProperties") else k for k in schema}
+    return own + [found for k, value in schema.items() for found in lists_of(value, names[k])]
+
+
+def test_a_list_has_a_fixed_length_or_may_have_one_entry():
+    lists = lists_of(json.loads(json_schema()))
+    free = {key: each["minItems"] for key, each in lists if each["minItems"] != each.get("maxItems")}
+    assert {"masses_kg", "directions", "points_m", "nodes", "pattern"} - free.keys() <= {"pattern"}
+    assert {key: least for key, least in free.items() if least != 1} == {"flat_distances_m": 2}
+
+
 def test_keys_end_with_their_unit_and_become_si():
     table = table_of(BladePair)(twist_deg=8.0, pitch_m=0.06)
     made = build(BladePair, table)

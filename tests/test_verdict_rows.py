@@ -724,6 +724,15 @@ def flutter_waves(*hertz: tuple[float, ...]) -> list[Any]:
         ),
         ([[0.0, 0.02], [0.02, 0.03]], [("warning", "mode 1 has less damping")]),
         (
+            [[0.0, 0.02], [0.005, 0.03]],
+            [("warning", "mode 1 has less", "; 2 waves have too little in all", "Add damping")],
+        ),
+        ([[0.0, 0.005], [0.02, 0.03]], [("warning", "mode 1 has less", "; 2 modes of 1 wave have too little in all")]),
+        (
+            [[-5e-324, 0.005], [0.0, 0.03]],
+            [("warning", "mode 1 grows: damping -4.94", "at 100 Hz.", "The wheel flutters")],
+        ),
+        (
             [[0.02, -1e-6], [0.005, 0.03]],
             [("warning", "mode 2 grows: damping -0.0001 % at 200 Hz.", "The wheel flutters")],
         ),

@@ -13,7 +13,7 @@ from test_report import marks, needs_browser, open_page, page_text
 
 from stickslip.analyses.page import plots, report_file, report_html
 from stickslip.analyses.waves.page.campbell import campbell_diagram
-from stickslip.analyses.waves.page.safe import interference, safe_diagram, zigzag
+from stickslip.analyses.waves.page.safe import _cards, interference, safe_diagram, zigzag
 from stickslip.analyses.waves.page.waves import Waves, view_of
 from stickslip.analyses.waves.records import Campbell, Interference
 from stickslip.model.mesh.solid_mesh import coarse_skin
@@ -128,6 +128,31 @@ def test_near_resonance_is_the_answer_and_opens_the_mode_shapes() -> None:
     assert f'"shown":[{diameter},{int(met.crossing_mode.values[0, k])}]' in html
     assert "Figure 1. Campbell diagram" in page_text(html)
     assert '"shown":[0,0]' in report_html(tree_of(provenance(), modes=modes))
+
+
+@pytest.mark.parametrize(
+    ("margin", "value", "label", "note"),
+    [
+        (
+            0.2,
+            "6\u202f546.5 rpm",
+            "EO 2 meets ND 2, mode 1 (+9.1 %)",
+            "3 near resonances within 20 % of 6\u202f000 rpm, EO 4 meets ND 4, mode 2 (−11 %), EO 5 meets ND 3, mode 3 (−14 %)",
+        ),
+        (0.1, "6\u202f546.5 rpm", "EO 2 meets ND 2, mode 1 (+9.1 %)", "1 near resonance within 10 % of 6\u202f000 rpm"),
+        (
+            0.02,
+            "No",
+            "near resonance within 2 % of 6\u202f000 rpm",
+            "the nearest: EO 2 meets ND 2, mode 1 (+9.1 %) at 6\u202f546.54 rpm",
+        ),
+    ],
+)
+def test_the_answer_of_a_safe_diagram_names_order_wave_mode_and_margin(
+    margin: float, value: str, label: str, note: str
+) -> None:
+    (card,) = _cards(view(Interference, safe_result(margin)))
+    assert (card.value, card.label, card.note) == (value, label, note)
 
 
 def test_cases_that_are_alike_are_drawn_once() -> None:

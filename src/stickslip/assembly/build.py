@@ -441,7 +441,7 @@ def _on_shapes(model: Model, structure: Structure, at: Coordinates, needed: IntA
     own = at.ids[at.stays]
     joined = np.isin(own, np.union1d(model.ties.followers, model.ties.weights.nonzero()[1]))
     joined[np.unique(at.columns(picked(needed, model.places.n)).nonzero()[1])] = False
-    interface = np.flatnonzero(joined & (own >= 0))
+    interface = np.flatnonzero(joined)
     if not interface.size:
         raise input_error(
             INTERFACE_MODES,

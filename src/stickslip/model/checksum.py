@@ -63,7 +63,11 @@ def _checked(stream: IO[bytes], size: int, *, required: bool) -> int:
     stream.seek(max(size - LENGTH, 0))
     end = stream.read(LENGTH)
     at = end.rfind(MARK)
-    if at > 0 or any(end.endswith(MARK[:n]) for n in range(MIN_MARK_BYTES, len(MARK) + 1)):
+    if (
+        at > 0
+        or (at == 0 and size < LENGTH)
+        or any(end.endswith(MARK[:n]) for n in range(MIN_MARK_BYTES, len(MARK) + 1))
+    ):
         raise Cut("was cut off within the checksum at its end")
     if at == 0:
         stream.seek(0)

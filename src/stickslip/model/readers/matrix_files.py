@@ -387,7 +387,7 @@ def _from_arrays(arrays: Arrays, name: str, n: int | None, place: str) -> Matrix
         else:
             build = scipy.sparse.csr_array if kind == "csr" else scipy.sparse.csc_array
             matrix = build((data, first, second), shape=(n, n))
-            matrix.check_format(full_check=True)
+            matrix.check_format()  # all indices, too
     except (ValueError, IndexError, TypeError) as error:
         raise input_error(place, f"its arrays do not fit together ({error})", BROKEN) from error
     return scipy.sparse.csr_array(matrix)

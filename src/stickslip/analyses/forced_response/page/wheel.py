@@ -206,7 +206,7 @@ def wheel_at_peak(response: Response) -> Plot | None:
         share = waves[case.index] ** 2
         main = int(np.argmax(share))
         said[case.index] = (
-            f"Wave {main} ({min(main, count - main)} nodal diameters) carries {percent(100 * float(share[main] / share.sum()))} of the sum of "
+            f"Wave {main} ({min(main, count - main)} nodal diameters) carries {percent(100 * float(share[main] / (share.sum() or 1.0)))} of the sum of "
             f"squares; localisation factor {number(response.blades[case.index].localisation, 3)} (0: all alike, 1: one blade alone)."
         )
     styled(figure, 460)
