@@ -71,12 +71,12 @@ def prestress_terms(
         motion, own = _inner(shape, law, slopes, volume), None
         free = laws.thermal_strain(shape, piece) if heated else None
         if motion is not None and free is not None:
-            own = _inner_start(shape, law, slopes, volume, free)
+            own = inner_start(shape, law, slopes, volume, free)
         turn = displacement_gradients(mesh, slopes, piece, displacement, motion, own)
         small = strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
         large = strain_operator(turn, slopes)
         m, q, k, _ = slopes.shape
-        stressed = (volume[:, :, None, None] * (_elasticity(law) @ large)).reshape(m, 6 * q, 3 * k)
+        stressed = (volume[:, :, None, None] * (elasticity(law) @ large)).reshape(m, 6 * q, 3 * k)
         mixed = small.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         square = large.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         stress = volume[:, :, None, None] * second_stress(law, turn, green, free)
@@ -101,7 +101,7 @@ def internal_force(laws: CellLaws, shape: Shape, displacement: FloatArray) -> Fl
         motion, own = _inner(shape, law, slopes, volume), None
         free = laws.thermal_strain(shape, piece)
         if motion is not None and free is not None:
-            own = _inner_start(shape, law, slopes, volume, free)
+            own = inner_start(shape, law, slopes, volume, free)
         turn = displacement_gradients(mesh, slopes, piece, displacement, motion, own)
         first = (np.eye(3) + turn) @ second_stress(law, turn, green=True, free=free)
         _pull(force, mesh.cells[piece], shape, first, slopes, volume, motion)
@@ -141,7 +141,7 @@ def _pull(
         force[:, axis] += np.bincount(nodes, pull[..., axis].ravel(), minlength=len(force))
 
 
-def _inner_start(shape: Shape, law: FloatArray, slopes: FloatArray, volume: FloatArray, free: FloatArray) -> FloatArray:
+def inner_start(shape: Shape, law: FloatArray, slopes: FloatArray, volume: FloatArray, free: FloatArray) -> FloatArray:
     """Return the (m, 9) amplitudes of a brick's incompatible modes that the thermal strain causes while its nodes are held."""
     stress = second_stress(law, free, green=False)
     pull = np.einsum("mqac,mqkc,mq->mka", stress, slopes[:, :, shape.width :], volume, optimize=True)
@@ -193,7 +193,7 @@ def second_stress(law: FloatArray, turn: FloatArray, green: bool, free: FloatArr
     return np.asarray(first * trace * np.eye(3) + 2 * second * strain)
 
 
-def _elasticity(law: FloatArray) -> FloatArray:
+def elasticity(law: FloatArray) -> FloatArray:
     """Return (m, 1 or q, 6, 6) matrices from strain vectors to stress vectors."""
     if law.ndim > 2:
         return law
