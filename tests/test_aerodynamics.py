@@ -9,6 +9,7 @@ from cyclic_models import random_sector
 
 import stickslip as ss
 from stickslip.harmonic.travelling import condense_side, condense_waves
+from stickslip.model.matrices import lumped
 from stickslip.reduction import (
     Feedback,
     InfluenceCoefficients,
@@ -21,6 +22,7 @@ from stickslip.reduction import (
     tuned_wheel,
 )
 from stickslip.reduction.tuned import conjugate
+from stickslip.response.stability.hill_method.hill_modes import hill_modes
 from stickslip.response.time.sectors import all_sectors
 from stickslip.units import RPM
 
@@ -32,6 +34,31 @@ def table(patterns=2, frequencies=(80.0, 100.0, 130.0), distances=(-1, 0, 1), **
     shape = (1, len(frequencies), len(distances), patterns, patterns)
     values = RNG.standard_normal(shape) + 1j * RNG.standard_normal(shape)
     return InfluenceCoefficients(np.array(distances), values, np.array(frequencies), **more)
+
+
+def test_disturbances_feel_the_table_where_it_depends_on_the_frequency_and_the_frozen_form_elsewhere():
+    """Coefficients of one frequency hold as stiffness and dashpot at all; those of a table take their place at each."""
+    structure = lumped(np.array([1.0, 2.0, 3.0]), np.diag([4.0, 5.0, 6.0]) + 0.5, 0.02 * np.eye(3))
+    pattern, no_contact = np.array([[1.0], [0.5], [-0.2]]), np.zeros((0, 3))
+
+    def modes(feedback):
+        return hill_modes(structure, no_contact, np.zeros(0), np.zeros(0, dtype=int), 1.5, feedback)
+
+    one = InfluenceCoefficients([0], np.array([0.3 + 0.2j]).reshape(1, 1, 1, 1, 1))
+    two = InfluenceCoefficients([0], np.array([0.3 + 0.2j, 0.5 + 0.6j]).reshape(1, 2, 1, 1, 1), np.array([1.0, 4.0]))
+    places = [0.1 + 1j, 2j, -0.2 + 2.5j]
+    plain, frozen, table = (modes(own and Feedback(pattern, 0.0, own, 1.0)) for own in (None, one, two))
+    more = []
+    for z in places:
+        np.testing.assert_array_equal(frozen.dynamic(z, 1.0), plain.dynamic(z, 1.0))
+        np.testing.assert_array_equal(frozen.diagonal(z, 1.0), plain.diagonal(z, 1.0))
+        # table less frozen form at 1.5 Im z; the frozen form is 0.3 + 0.2 s in the exponent s = 1.5 z
+        share = (1.5 * z.imag - 1.0) / 3.0
+        felt = (0.3 + 0.2 * share) + 1j * (0.2 + 0.4 * share) - 0.3 - 0.2 * 1.5 * z
+        more.append((plain.dynamic(z, 1.0) - table.dynamic(z, 1.0)) / felt)
+    for own in more:
+        assert np.linalg.matrix_rank(own, tol=1e-12) == 1
+        np.testing.assert_allclose(own, more[0], atol=1e-14)
 
 
 def test_the_transform_leads_both_ways_and_angles_may_come_in_any_order():

@@ -96,6 +96,34 @@ def test_the_peak_is_told_with_its_place_and_the_largest_amplitude_in_the_range(
     assert "Shaded: the operating range." in figure.caption
 
 
+@pytest.mark.parametrize("place", ["below", "above", "around the lower", "around both"])
+def test_of_several_cases_the_peak_nearest_to_the_range_is_told(place: str) -> None:
+    data = synthetic_result(ratios=(20, 5), n=24, verify=False)
+    hz = data["frequency_hz"].values
+    view = Response(data)
+    peaks = [view.peak_hz(case) for case in view.cases]
+    first, last = np.argsort(peaks)
+    low, high = {
+        "below": (0.8 * peaks[first], 0.9 * peaks[first]),
+        "above": (1.1 * peaks[last], 1.2 * peaks[last]),
+        "around the lower": (0.99 * peaks[first], 0.5 * (peaks[first] + peaks[last])),
+        "around both": (0.9 * peaks[first], 1.1 * peaks[last]),
+    }[place]
+    ends = {"lowest_hz": hz.min(), "highest_hz": hz.max(), "operating_lowest_hz": low, "operating_highest_hz": high}
+    ends |= {"operating_lowest_rpm": np.nan, "operating_highest_rpm": np.nan}
+    response = Response(data.assign({name: ("case", [value] * 2) for name, value in ends.items()}))
+    (card,) = (c for c in cards(response) if "operating range" in c.label)
+    if place.startswith("around"):
+        assert card.value == "Inside"
+        assert card.label == f"{2 if place == 'around both' else 1} of 2 peaks in the operating range"
+        return
+    near, off = (first, peaks[first] / high - 1) if place == "below" else (last, 1 - peaks[last] / low)
+    assert card.value == f"{100 * off:.2g} % {'above' if place == 'below' else 'below'}"
+    assert card.label == "margin of the peak to the operating range"
+    assert response.cases[near].where in card.note
+    assert response.cases[1 - near].where not in card.note
+
+
 def test_a_range_in_speeds_is_told_in_speeds_and_what_is_not_swept_is_doubted() -> None:
     _, plain = ranged(1.0, 2.0)
     low, high = plain.numbers.lowest_hz, plain.numbers.highest_hz

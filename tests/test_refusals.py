@@ -21,7 +21,8 @@ from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.assembly.forces import Load
 from stickslip.assembly.sides.mistuning import BladeMistuning, ContactMistuning
-from stickslip.contact.laws.iwan import FirstLoading
+from stickslip.contact.laws.bouc_wen import BoucWen
+from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
 from stickslip.contact.loop_fit import fit_loops
 from stickslip.errors import InputError
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -42,6 +43,7 @@ from stickslip.model.fe.material import (
 )
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.matrices import chain, lumped
+from stickslip.model.mesh.sector import Platform, Shroud
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.npz import read_npz, write_npz
 from stickslip.model.part import BodyPoints
@@ -58,7 +60,7 @@ from stickslip.response.forced.response import forced_problem
 from stickslip.response.residual_tractions.bounds import traction_bounds
 from stickslip.response.rotating.campbell import campbell
 from stickslip.response.rotating.safe import safe
-from stickslip.response.time.transient import check_outputs
+from stickslip.response.time.transient import TimeStepping, check_outputs
 from stickslip.study.models.study import read_study
 
 
@@ -314,6 +316,36 @@ def test_arguments_are_refused_by_name_with_the_remedy(make: Callable[[], object
     with pytest.raises(InputError) as told:
         make()
     assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "inside", "outside"),
+    [
+        (lambda v: TimeStepping(tolerance=v), (1e-300, 0.999), (0.0, 1.0)),
+        (lambda v: TimeStepping(rings=v), (0.0, 0.999), (-1e-9, 1.0)),
+        (lambda v: TimeStepping(steps_per_period=v), (16, 10_000_000), (15, 10_000_001)),
+        (lambda v: TimeStepping(max_periods=v), (2,), (1,)),
+        (lambda v: TimeStepping(harmonics=v), (1, 511), (0, 512)),
+        (lambda v: TimeStepping(min_periods=v), (1,), (0,)),
+        (lambda v: Material(poisson_ratio=v), (0.0, 0.499), (-1e-9, 0.5)),
+        (lambda v: Shroud(span=v), (1e-9, 1.0), (0.0, 1.001)),
+        (lambda v: Shroud(face_angle=math.radians(v)), (-75.0, 75.0), (-75.1, 75.1)),
+        (lambda v: Platform(underside_angle=math.radians(v)), (0.0, 75.0), (-0.1, 75.1)),
+        (lambda v: BoucWen(k_t=1.0, beta=2.0, gamma=1.0, alpha=v), (0.0, 1.0), (-1e-9, 1.001)),
+        (lambda v: BoucWen(k_t=1.0, beta=2.0, gamma=1.0, exponent=v), (1.0, 20.0), (0.999, 20.1)),
+        (lambda v: UniformBand(half_width=v), (1e-9, 1.0), (0.0, 1.001)),
+        (lambda v: UniformBand(elastic_share=v), (0.0, 0.999), (-1e-9, 1.0)),
+        (lambda v: FourParameter(chi=v, beta=0.0), (-0.999, 0.0), (-1.0, 1e-9)),
+    ],
+)
+def test_numbers_are_accepted_up_to_their_bounds(
+    make: Callable[[float], object], inside: tuple[float, ...], outside: tuple[float, ...]
+) -> None:
+    for value in inside:
+        make(value)
+    for value in outside:
+        with pytest.raises(InputError):
+            make(value)
 
 
 def test_files_of_structures_are_refused_by_path_with_the_remedy(tmp_path: Path) -> None:

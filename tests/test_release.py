@@ -94,7 +94,18 @@ def test_what_is_imported_is_of_the_core_or_named_with_its_extra():
         }
     assert not lacking
     # IPython shows progress in its own notebooks, psutil serves where there is no /proc: both are asked for before
-    asked_for = {"gmsh", "skfem", "meshio", "feral", "pyuff", "executorlib", "IPython", "matplotlib", "psutil", "pylife"}
+    asked_for = {
+        "gmsh",
+        "skfem",
+        "meshio",
+        "feral",
+        "pyuff",
+        "executorlib",
+        "IPython",
+        "matplotlib",
+        "psutil",
+        "pylife",
+    }
     assert inside <= asked_for
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from solid_models import box
 
-from stickslip.assembly.joints.untied_faces import meeting_faces, uncoupled, untied_faces
+from stickslip.assembly.joints.untied_faces import MeetingFaces, _sets, meeting_faces, uncoupled, untied_faces
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material
@@ -177,3 +177,26 @@ def test_the_order_of_the_faces_in_the_tie_of_a_deck_is_free(tmp_path: Path) -> 
     for name, nodes in decks[0].mesh.node_sets.items():
         np.testing.assert_array_equal(decks[1].mesh.node_sets[name], nodes)
     np.testing.assert_array_equal(decks[0].held, decks[1].held)
+
+
+def test_sets_that_meet_are_told_the_largest_first_and_no_set_with_itself():
+    """Nodes on the axis lie on both faces: turned, their set meets itself."""
+    heights = np.linspace(0.0, 1.0, 4)
+    axis, low = (np.array([[r, 0.0, z] for r in radii for z in heights]) for radii in ((0.0,), (0.4, 0.7, 1.0)))
+    points = np.vstack([axis, low, Axis().turned(low, np.pi / 3), [[0.5, 0.2, 0.5]] * 5])
+    centre, here, there = np.arange(4), np.arange(4, 16), np.arange(16, 28)
+    sets = {
+        "AXIS": centre,
+        "RIM_HIGH": there[8:],
+        "RIM_LOW": here[8:],
+        "LOW": here,
+        "HIGH": there,
+        "INSIDE": np.arange(28, 33),
+        "FEW": here[:2],
+        "FEW_HIGH": there[:2],
+    }
+    found = MeetingFaces(6, Axis(), np.r_[centre, here], np.r_[centre, there], 0.2)
+    assert _sets(SolidMesh(points, np.zeros((0, 4), dtype=int), sets), found) == [
+        ("LOW", "HIGH"),
+        ("RIM_LOW", "RIM_HIGH"),
+    ]
