@@ -488,7 +488,7 @@ def test_warnings_of_a_sweep_beside_all_resonances() -> None:
     asked = lifted(omega_range=(60 * HZ, 70 * HZ))
     told = (
         "no natural frequency lies between 60.00 and 70.00 Hz, neither with open nor with stuck contacts; the nearest one is "
-        "50.00 Hz. Widen forced_response.frequency_hz."
+        "50.00 Hz. Widen forced_response.frequency_hz: frequency_hz = [48, 52] holds it."
     )
     (verdict,) = no_resonance(asked)
     assert f"{verdict.why}. {verdict.remedy}" == told

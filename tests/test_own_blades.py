@@ -3,7 +3,9 @@
 import math
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,7 +31,7 @@ from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
 from stickslip.response.system import System
-from stickslip.study.check import check_study
+from stickslip.study.check import axis_doubts, check_study
 from stickslip.study.models.study import read_study
 
 pytestmark = pytest.mark.usefixtures("peak_alone", "parts_once")
@@ -263,3 +265,39 @@ def test_a_damper_far_from_its_blades_is_told_how_far(tmp_path: Path) -> None:
     assert "contact.left (side A: damper.left" in told
     assert re.search(r"; the nearest nodes or points of both lie 0\.2\d+ m apart\.", told)
     assert "raise tolerance_m" in told
+
+
+def test_an_axis_that_no_blade_turns_about_is_doubted(tmp_path: Path) -> None:
+    """The blade of the deck stands at the top of a wheel about y; without a key a model turns about z, along the blade."""
+    blade = read_study(write(tmp_path, FEW)).model().parts["left"]
+    y, apart = (
+        (0.0, 1.0, 0.0),
+        r"does not lie below left: from its clamped nodes to its centre of mass it reaches along \(0\.0\d+, 0, 1\)",
+    )
+    for axis, said in (
+        (Axis(y), None),
+        (Axis((0.3, 1.0, 0.1)), None),
+        (Axis(), apart),
+        (Axis(y, (0.0, 0.0, 1.0)), r"the centrifugal load acts along \([-.\d]+, 0, -1\)"),
+        (Axis(y, (0.0, 0.0, -300.0)), "Check the units of left and of part.left.axis_origin_m"),
+    ):
+        told = list(axis_doubts(SimpleNamespace(parts={"left": replace(blade, axis=axis)})))
+        assert [bool(re.search(said or "", one)) for one in told] == [True] * bool(said), told
+
+
+def test_a_disk_and_a_shaft_may_turn_about_their_own_axes() -> None:
+    """Both are clamped at one end of the axis, and a beam that hangs on a wheel turns about an axis below it alone."""
+    ring, along = np.linspace(0.0, 2 * np.pi, 12, endpoint=False), np.linspace(0.0, 1.0, 5)
+    shaft = np.array([(math.cos(a), math.sin(a), 10 * z) for z in along for a in ring])
+    plank = shaft * (0.2, 1.0, 1.0)
+    for points, count in ((shaft, 0), (plank, 1)):
+        numbers = np.arange(len(points))
+        part = SimpleNamespace(
+            mesh=SimpleNamespace(points=points, numbers=numbers),
+            structure=SimpleNamespace(dofs=SimpleNamespace(node=numbers[12:])),
+            axis=Axis(),
+            sectors=1,
+            template=None,
+            memo={"facts": SimpleNamespace(centre=points.mean(axis=0))},
+        )
+        assert len(list(axis_doubts(SimpleNamespace(parts={"shaft": part})))) == count

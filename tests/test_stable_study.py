@@ -1,5 +1,6 @@
 """Stability inside a run: what is examined and said of it, where the motion in time decides, and that nothing is done twice."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -40,6 +41,7 @@ from stickslip.analyses.forced_response.stability.stable import (
     cost_lines,
     examine,
     to_integrate,
+    why_not,
     with_motion,
 )
 from stickslip.analyses.forced_response.verdicts.rules import fewer
@@ -423,16 +425,23 @@ def test_the_integration_of_a_wheel_counts_all_sectors_that_are_marched() -> Non
     assert sectors_in_time(replace(whole, structure=even)) == 2
 
 
-def test_what_costs_too_much_is_said_by_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_costs_too_much_is_said_by_its_size_with_the_key_that_allows_it() -> None:
     asked = rubbed()
     response = response_of(asked)
     assert "about" in "; ".join(cost_lines(asked))
-    monkeypatch.setattr(examination, "MOST_WORK", 1.0)
+    asked = replace(asked, stability_s=1e-12)
     assert set(looked_at(replace(asked, examine="all"), response)) == {response.peak}
     assert response.top is not None
     found = examine(asked, response.top)
     assert found.verdict == "not examined"
     assert "2 coordinates with 2 contacts would take about" in found.reason
+    assert found.reason.endswith("more than 1e-12 s (forced_response.stability_s)")
+    # the remedy names the key, a value that suffices, and what it costs
+    told = cost_lines(asked)
+    (remedy,) = [line for line in told if "examines the peak" in line]
+    enough = float(re.search(r"forced_response\.stability_s = (\S+) examines", remedy)[1])  # type: ignore[index]
+    assert why_not(replace(asked, stability_s=enough)) == ""
+    assert any("run --verify integrates the peak in time" in line for line in told)
     assert not to_integrate(asked, response, [found])
 
 

@@ -110,6 +110,8 @@ class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, t
     """number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with more points where it turns (a single passage then steps through as many as points says)"""
     stability: Literal["auto", "peak", "off", "all"]
     """where stability is examined, by Floquet multipliers. auto: at the peak, the ends, beside folds and where the transitions of the cycle change, then at all other points up to 500 rows of the matrices, for larger ones within the work of the solutions; peak: at the peak alone; all: at every point; off: nowhere; default 'auto'"""
+    stability_s: float
+    """estimated time of an examination of stability, in seconds, above which none is begun; a wheel has its own limits. Greater than zero; default 60.0"""
     bifurcations: Literal["off", "folds", "all", "branches"]
     """bifurcations located along the branch. folds: where it turns back; all: period doublings, Neimark-Sacker bifurcations and branch points, too, by the multipliers at every point; branches: all, and the periodic motions that leave there are followed; default 'off'"""
     not_periodic: Literal["in_time", "off"]

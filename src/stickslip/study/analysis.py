@@ -185,7 +185,7 @@ class Advice:
     beside
         Context of the frequency range: natural frequencies, and the possible effect of friction.
     solving_s
-        Least and largest time on one core to solve the case, s; zero if not estimated.
+        Likely and largest time on one core to solve the case, s; zero if not estimated.
     """
 
     computed: tuple[str, ...] = ()

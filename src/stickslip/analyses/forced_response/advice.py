@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from stickslip.analyses.forced_response.physics.known import (
     no_resonance,
     nothing_pressed,
     off_engine_order,
+    range_around,
 )
 from stickslip.analyses.forced_response.physics.limits import (
     ESTIMATE,
@@ -69,6 +71,8 @@ def advice(case: Case, model: Model) -> Advice:
         *(v for v in known if v.rank),
     ]
     cost = estimate(model, question.sweep) if question.stepping is None else None
+    if cost is not None and physics is not None:
+        cost = replace(cost, slips=physics.slip_ratio)
     return Advice(
         computed=_computed(case, model, question, cost),
         doubts=(*doubted, *(f"{v.why}. {v.remedy}" for v in doubts), *units_in_doubt(question, model)),
@@ -78,9 +82,10 @@ def advice(case: Case, model: Model) -> Advice:
             *_in_operation(question, *of_frequencies(asked_of(case), model.engine_order)),
             *([] if physics is None else driven_line(physics)),
             *_of_friction(physics),
+            *_left_out(question, physics),
             *_notes(question),
         ),
-        solving_s=(0.0, 0.0) if cost is None else (cost.least_seconds, cost.most_seconds),
+        solving_s=(0.0, 0.0) if cost is None else (cost.likely_seconds, cost.upper_seconds),
     )
 
 
@@ -239,6 +244,19 @@ def _of_friction(physics: Physics | None) -> Iterator[str]:
         yield from mode.sentences
     if damped:
         yield ESTIMATE
+
+
+def _left_out(question: Question, physics: Physics | None) -> Iterator[str]:
+    """Yield the range that the sweep leaves out between the sticking and the sliding mode that the load drives most."""
+    top = None if physics is None else physics.driven
+    if physics is None or top is None:
+        return
+    ends = sorted((physics.ends(top) / HZ, top.hz))
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    if ends[0] < lowest or ends[1] > highest:
+        held = range_around(question, *(question.driven[0] * end for end in ends))
+        yield f"the sweep leaves out a part between this mode stuck, {top.hz:.2f} Hz, and sliding freely, {physics.ends(top) / HZ:.2f} Hz"
+        yield f"{held} holds both"
 
 
 def _notes(question: Question) -> Iterator[str]:

@@ -21,6 +21,7 @@ POINTS = 1.7  # points of a branch for each requested point: more are taken wher
 NEWTON_A_POINT = 6
 FACTORISED = 500  # unknowns above which the time of a Newton step no longer grows with their cube
 AT_THE_CAP = 0.1  # share of points that "auto" solves with the highest harmonics allowed
+SOME = 15  # harmonics that most points with slip are content with
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
 FEWEST_A_POINT = 2  # Newton steps if hardly a contact slips: two wheels took 1.6 to 3
 SECONDS_A_STEP = 1.5e-3  # of a Newton step, even with few unknowns
@@ -57,6 +58,10 @@ class Estimate:
         integration are not counted.
     most
         Assumption on harmonics behind `most_seconds`, in words; empty if their number is fixed.
+    some_seconds
+        Time on one core if the points that need many harmonics need `SOME` only, s.
+    slips
+        Largest tangential force of a contact over its limit at the resonance with stuck contacts; NaN if unknown.
     """
 
     nodes: int
@@ -67,6 +72,19 @@ class Estimate:
     least_seconds: float
     most_seconds: float
     most: str = ""
+    some_seconds: float = 0.0
+    slips: float = float("nan")
+
+    @property
+    def likely_seconds(self) -> float:
+        """Time to solve the case: the least where contacts stick at the resonance, else with `SOME` harmonics, s."""
+        return self.least_seconds if self.slips < 1.0 else self.some_seconds
+
+    @property
+    def upper_seconds(self) -> float:
+        """Upper bound: three times the least where contacts stick at the resonance, else `most_seconds`, s."""
+        few = NEWTON_A_POINT / FEWEST_A_POINT * self.least_seconds
+        return min(few, self.most_seconds) if self.slips < 1.0 else self.most_seconds
 
     @property
     def seconds(self) -> float:
@@ -76,15 +94,33 @@ class Estimate:
     @property
     def lines(self) -> tuple[str, ...]:
         """The estimate in sentences, one a line."""
-        least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))
-        many = f", {self.most}" if self.most else ""
+        likely, upper = map(lasting, (self.likely_seconds, self.upper_seconds))
+        harmonics = self.most and not self.slips < 1.0
         return (
-            f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {least} to {most} s to solve this case",
-            f"estimate: least if contacts hardly slip, most if all slip{many}",
+            f"estimate: about {self.model_seconds:.0f} s for the parts, once, then {likely} to solve this case, at most {upper}",
+            f"estimate: {_of_slip(self.slips)}",
+            *[f"estimate: uncertain is how many harmonics that takes, here H = {SOME}, at most {self.most}"]
+            * bool(harmonics),
             f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
             f"estimate: on top come stability, audits and time integration, of doubted points up to some {SECONDS_OF_DOUBTS:.0f} s a case",
             f"estimate: limits.work_s is compared with {self.seconds:.0f} s",
         )
+
+
+def lasting(seconds: float) -> str:
+    """Return a time in words, short ones with one digit."""
+    return (
+        f"{seconds / 60:.0f} min" if seconds >= 120.0 else f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.1g} s"
+    )
+
+
+def _of_slip(ratio: float) -> str:
+    """Describe contacts at the resonance, which decide the cost."""
+    if ratio < 1.0:
+        return f"contacts stick at the resonance (friction forces up to {100 * ratio:.2g} % of their limit)"
+    if ratio >= 1.0:
+        return f"contacts slip at the resonance (stuck, a friction force would be {ratio:.2g} times its limit)"
+    return "whether contacts slip at the resonance is not known"
 
 
 def estimate(model: Model, sweep: Sweep) -> Estimate:
@@ -124,7 +160,15 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
         least_seconds=least_seconds,
         most_seconds=most_seconds,
         most="" if kept else harmonics,
+        some_seconds=_with_some(model, sweep, most_seconds),
     )
+
+
+def _with_some(model: Model, sweep: Sweep, most: float) -> float:
+    """Return the largest time with `SOME` harmonics at the points that need many, s; `most` if no more are allowed."""
+    if not sweep.auto or sweep.high_harmonics[-1] <= SOME or sweep.low_harmonics[-1] > SOME:
+        return most
+    return estimate(model, replace(sweep, cap=SOME)).most_seconds
 
 
 def _numbers(sectors: int, coordinates: int, unknowns: int) -> int:

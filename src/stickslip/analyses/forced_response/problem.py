@@ -164,6 +164,8 @@ class Question:
         Whether this is the first case, which also stores the variables common to all cases.
     examine
         Points whose stability is examined: ``auto``, ``peak``, ``all`` or ``off``.
+    stability_s
+        Estimated time of an examination, s, above which none is begun.
     bifurcations
         Bifurcations located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and their side branches are followed.
     not_periodic_s
@@ -193,6 +195,7 @@ class Question:
     checks: frozenset[str] = frozenset()
     first: bool = True
     examine: Literal["auto", "peak", "off", "all"] = "auto"
+    stability_s: float = 60.0
     bifurcations: Literal["off", "folds", "all", "branches"] = "off"
     not_periodic_s: float = 0.0
     not_periodic_points: int = 2
@@ -352,6 +355,7 @@ def question_of(case: Case, model: Model) -> Question:
         checks=case.checks,
         first=case.index == 0,
         examine=settings.forced_response.stability,
+        stability_s=settings.forced_response.stability_s,
         bifurcations=settings.forced_response.bifurcations,
         not_periodic_s=(
             settings.forced_response.not_periodic_s if settings.forced_response.not_periodic == "in_time" else 0.0

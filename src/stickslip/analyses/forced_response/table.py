@@ -53,6 +53,10 @@ class ForcedResponse(Section):
         "auto",
         description="where stability is examined, by Floquet multipliers. auto: at the peak, the ends, beside folds and where the transitions of the cycle change, then at all other points up to 500 rows of the matrices, for larger ones within the work of the solutions; peak: at the peak alone; all: at every point; off: nowhere",
     )
+    stability_s: Positive = Field(
+        60.0,
+        description="estimated time of an examination of stability, in seconds, above which none is begun; a wheel has its own limits. Greater than zero",
+    )
     bifurcations: Literal["off", "folds", "all", "branches"] = Field(
         "off",
         description="bifurcations located along the branch. folds: where it turns back; all: period doublings, Neimark-Sacker bifurcations "

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stickslip.analyses.forced_response.problem import Question
+from stickslip.analyses.forced_response.problem import STILL_HZ, Question
 from stickslip.analyses.forced_response.records.points import Response
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.law_check import law_fault
@@ -17,6 +17,7 @@ from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM
 
 COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
+ASIDE = 0.04  # of a frequency, that a proposed range leaves beside it
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -134,7 +135,27 @@ def no_resonance(question: Question) -> tuple[Verdict, ...]:
         f"no natural frequency lies between {lowest:.2f} and {highest:.2f} Hz, neither with open nor with stuck contacts; the "
         f"nearest one is {near:.2f} Hz"
     )
-    return (Verdict("doubtful", why=why, remedy=f"Widen forced_response.{question.key}."),)
+    return (
+        Verdict("doubtful", why=why, remedy=f"Widen forced_response.{question.key}: {proposed(question)} holds it."),
+    )
+
+
+def proposed(question: Question) -> str:
+    """Return the key and a range of it that holds the nearest resonance, between open and stuck contacts, in words."""
+    lowest, highest = question.driven_hz
+    states = [hertz[hertz > STILL_HZ] for hertz in question.natural_states]
+    off = [np.maximum(lowest - hertz, hertz - highest) for hertz in states]
+    ends = [float(hertz[np.argmin(far)]) for hertz, far in zip(states, off, strict=True) if hertz.size]
+    return range_around(question, min(ends), max(ends))
+
+
+def range_around(question: Question, low: float, high: float) -> str:
+    """Return the key of the range and values of it around two driven frequencies in Hz, with `ASIDE` beside them."""
+    values = np.array([low * (1.0 - ASIDE), high * (1.0 + ASIDE)]) / question.driven[0]
+    if question.over_speed:
+        values = values * HZ / RPM / (question.model.engine_order or 1)
+    first, last = (f"{value:.{max(3, len(f'{value:.0f}'))}g}" for value in values)
+    return f"{question.key} = [{first}, {last}]"
 
 
 def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:

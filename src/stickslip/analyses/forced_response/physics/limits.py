@@ -10,6 +10,7 @@ from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import MotionAtPeak, PhysicsVerdicts, stored
 from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
+from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import is_of_a_user
 from stickslip.errors import InputError
@@ -53,6 +54,8 @@ class Physics:
         Effect of friction on each mode.
     touching
         Whether there are contacts.
+    springs
+        (n_contacts, 3) stiffnesses of the contacts that the static loads press, stuck, N/m.
     """
 
     stuck: tuple[RangeMode, ...]
@@ -60,6 +63,7 @@ class Physics:
     friction: Friction
     damped: tuple[DampedMode, ...]
     touching: bool
+    springs: FloatArray
 
     def where(self, text: str) -> str:
         """Return words about contacts; empty without contacts."""
@@ -81,6 +85,16 @@ class Physics:
         """The mode with the largest linear resonance with contacts stuck; None if the load excites none in the range."""
         known = [m for m in self.stuck if m.force > 0.0]
         return max(known, key=lambda m: m.resonance) if known else None
+
+    @property
+    def slip_ratio(self) -> float:
+        """Largest tangential force over its limit at the largest resonance with stuck contacts; NaN without friction or resonance."""
+        top = self.driven
+        if top is None or not self.friction.any:
+            return float("nan")
+        motion = np.abs(top.gaps[:, :2]) * top.resonance
+        force, limits = motion * self.springs[:, :2], self.friction.limits
+        return float(np.max(force[limits > 0.0] / limits[limits > 0.0]))
 
     def ends(self, mode: RangeMode) -> float:
         """Return the frequency of a mode with contacts sliding freely, rad/s; its own frequency if friction does not change it."""
@@ -107,7 +121,8 @@ def physics_of(question: Question) -> Physics | None:
         damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
     except InputError:  # the range exceeds the table of aerodynamic coefficients
         return None
-    return Physics(modes[0], modes[1], friction, tuple(damped), bool(system.interface.n_contacts))
+    touching = bool(system.interface.n_contacts)
+    return Physics(modes[0], modes[1], friction, tuple(damped), touching, np.reshape(stuck, (-1, 3)))
 
 
 def beforehand(physics: Physics) -> Iterator[Verdict]:

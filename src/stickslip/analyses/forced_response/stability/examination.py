@@ -10,7 +10,7 @@ from stickslip.response.time.sectors import different_sectors
 INTERVALS = 12  # intervals between transitions for each contact: 2 to 18 at the peaks of the two blades
 PRODUCTS = 20  # matrix products for each interval
 FLOPS = 2e10  # operations of matrix products a second on one core
-MOST_WORK = 60 * FLOPS  # limit of one examination
+MOST_S = 60.0  # largest estimated time of one examination, unless a study allows another
 MOST_WHEEL = 4 * FLOPS  # the same for a forced motion of a wheel, whose other waves are reduced for this purpose alone
 MOST_HILL = 300 * FLOPS  # the same for Hill's method, whose estimate is an upper bound: few contacts slip
 MOTIONS = 2.0  # motions examined at a point: as solved, and with more harmonics
@@ -30,7 +30,7 @@ def examination_work(system: System) -> float:
     return 2.0 * intervals * PRODUCTS * 2.0 * rows**3
 
 
-def too_long(system: System, *, forced: bool) -> str:
+def too_long(system: System, *, forced: bool, most_s: float = MOST_S, key: str = "") -> str:
     """Return the reason why an examination would take too long, by the size of the model; empty if it would not.
 
     The cost does not depend on the waves that the harmonics excite, because all sectors are integrated.
@@ -41,24 +41,23 @@ def too_long(system: System, *, forced: bool) -> str:
         The vibrating system.
     forced
         Whether a load drives it.
+    most_s, key
+        Largest estimated time allowed, s, except for forced motions of a wheel; the key of the study that sets it.
     """
     if not system.structure.reduced:
         return f"a reduced model is needed, and {KEPT}"
     side, work = system.structure, examination_work(system)
     wheel = side.wheel
-    most = MOST_WHEEL if forced and wheel is not None else MOST_WORK
+    most = MOST_WHEEL if forced and wheel is not None else most_s * FLOPS
     if work <= most:
         return ""
-    would = f"would take about {_lasting(work / FLOPS)} a motion, more than {most / FLOPS:.0f} s"
+    would = f"would take about {_lasting(work / FLOPS)} a motion, more than {most / FLOPS:.3g} s"
     if wheel is not None:
         return (
             f"against every wave all {wheel.sectors} sectors count, {wheel.sectors * side.n} coordinates with "
             f"{wheel.sectors * system.interface.n_contacts} contacts, which {would}"
         )
-    return (
-        f"{side.n} coordinates with {system.interface.n_contacts} contacts {would}: each interval between two transitions costs "
-        "the exponential of a matrix of twice as many rows"
-    )
+    return f"{side.n} coordinates with {system.interface.n_contacts} contacts {would}{f' ({key})' * bool(key)}"
 
 
 def hill_work(system: System) -> float:

@@ -1,6 +1,7 @@
 """Stability of a motion of a response: by multipliers, and by time integration."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
@@ -299,20 +300,39 @@ def unexaminable(question: Question) -> str:
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
-    why, wheel = too_long(system, forced=True), system.structure.wheel
+    why = too_long(system, forced=True, most_s=question.stability_s, key="forced_response.stability_s")
+    wheel = system.structure.wheel
     if not why and wheel is not None and not wheel.has_every_wave:
         return ONE_SECTOR
     return why
 
 
+def _instead(question: Question) -> Iterator[str]:
+    """Yield what examines a case that is too large, with its cost."""
+    system = question.model.system
+    if not system.structure.reduced or system.interface.rigid:
+        return
+    needed = examination_work(system) / FLOPS
+    if system.structure.wheel is None and needed > question.stability_s:
+        yield f"stability: forced_response.stability_s = {_rounded_up(needed):g} examines the peak, in about {needed:.0f} s of one core"
+    if not too_large(question):
+        yield f"stability: run --verify integrates the peak in time, in up to {seconds_in_time(system):.0f} s"
+
+
+def _rounded_up(value: float) -> float:
+    step = 10.0 ** max(math.floor(math.log10(value)) - 1, 0)
+    return step * math.ceil(value / step)
+
+
 def cost_lines(question: Question) -> tuple[str, ...]:
     """Return the lines of ``stickslip check`` about the examination."""
     if question.examine == "off":
-        return ('stability: not examined, forced_response.stability is "off"',)
+        return ('stability: not examined, forced_response.stability is "off"; "auto" examines it',)
     why = why_not(question)
     if why:
         first, *more = why.split(": ")
-        return (f"stability: not examined, {first}", *(f"stability: {text}" for text in more))
+        said = (f"stability: not examined, {first}", *(f"stability: {text}" for text in more))
+        return (*said, *_instead(question))
     if by_hill(question.model.system):
         system = question.model.system
         waves = "" if system.structure.wheel is None else " against every wave, one sector at a time"
