@@ -13,7 +13,7 @@ from newton_bounds import unknowns_bound
 from stickslip.contact.interface import Interface, sparse_rows
 from stickslip.contact.law import PAIRS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
+from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means, triangles
 from stickslip.errors import InputError
 from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic import matrix_products as matrix_products_module
@@ -309,6 +309,35 @@ def test_solution_is_that_of_lu(name, method):
         assert krylov.counts.failures == 0
     # the residual of 1e-11 times the condition of these matrices, about 1e2
     assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize(
+    ("entries", "below", "above"),
+    [
+        ([], False, False),
+        ([(0, 0), (1, 1), (2, 2), (3, 3), (4, 4)], False, False),  # equal diagonals: means alone
+        ([(1, 1)], False, True),
+        ([(3, 4)], False, True),
+        ([(4, 3)], False, True),
+        ([(0, 3)], False, True),
+        ([(2, 4)], False, True),
+        ([(1, 0)], True, False),
+        ([(4, 1)], True, False),
+        ([(3, 2), (1, 4)], True, True),
+        ([(p, q) for p in range(5) for q in range(5) if q > 2 * ((p + 1) // 2)], False, True),
+    ],
+)
+def test_triangles_hold_the_blocks_that_have_entries_in_them(entries, below, above):
+    """What has none costs nothing in a product: a stuck contact has its means, an open one nothing."""
+    blocks = np.zeros((3, 5, 5, 5))
+    for p, q in entries:
+        blocks[1, 2, p, q] = 2.0
+    found = triangles(blocks, harmonic_means(blocks))
+    assert found.below.tolist() == [[1, 2]] * below
+    assert found.above.tolist() == [[1, 2]] * above
+    assert found.lower.size == 8 * below
+    assert found.upper.size == 17 * above
+    assert found.lower.sum() == 2.0 * sum(q < 2 * ((p + 1) // 2) - 1 for p, q in entries)
 
 
 def test_preconditioner_is_exact_where_all_sticks():
