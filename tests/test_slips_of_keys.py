@@ -83,6 +83,11 @@ MISSPELT = [
     ("\nbetween = ", "\nbetwen = ", ["contact.shroud.betwen: unknown key 'betwen'. Did you mean 'between'?"]),
     ("\nfile = ", "\nfille = ", ["part.blade.fille: unknown key 'fille'. Did you mean 'file'?"]),
     ("speed_rpm = ", 'axis = "y"\nspeed_rpm = ', ["rotation.axis: unknown key 'axis'. The axis belongs to the part"]),
+    (
+        "\nfile = ",
+        '\nclamped = "root"\nfile = ',
+        ["part.blade.clamped: must be a list, got 'root'. Write clamped = ['root']. It means"],
+    ),
     ("speed_rpm = ", "speed_hz = ", ["rotation.speed_hz: unknown key 'speed_hz'. Did you mean 'speed_rpm'? "]),
 ]
 

@@ -87,6 +87,10 @@ class Estimate:
         return min(few, self.most_seconds) if self.slips < 1.0 else self.most_seconds
 
     @property
+    def _some(self) -> str:
+        return f", here H = {SOME}" if self.some_seconds < self.most_seconds else ""
+
+    @property
     def seconds(self) -> float:
         """Time compared with ``limits.work_s``: model and largest time of the response, s."""
         return self.model_seconds + self.most_seconds
@@ -99,7 +103,7 @@ class Estimate:
         return (
             f"estimate: about {self.model_seconds:.0f} s for the parts, once, then {likely} to solve this case, at most {upper}",
             f"estimate: {_of_slip(self.slips)}",
-            *[f"estimate: uncertain is how many harmonics that takes, here H = {SOME}, at most {self.most}"]
+            *[f"estimate: uncertain is how many harmonics that takes{self._some}, at most {self.most}"]
             * bool(harmonics),
             f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
             f"estimate: on top come stability, audits and time integration, of doubted points up to some {SECONDS_OF_DOUBTS:.0f} s a case",
@@ -120,7 +124,7 @@ def _of_slip(ratio: float) -> str:
         return f"contacts stick at the resonance (friction forces up to {100 * ratio:.2g} % of their limit)"
     if ratio >= 1.0:
         return f"contacts slip at the resonance (stuck, a friction force would be {ratio:.2g} times its limit)"
-    return "whether contacts slip at the resonance is not known"
+    return "whether contacts slip is not known without a resonance in the range"
 
 
 def estimate(model: Model, sweep: Sweep) -> Estimate:

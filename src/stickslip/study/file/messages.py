@@ -176,6 +176,8 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
         known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
         word = "off" if details["input"] is False else str(details["input"])
         return f"is not known, got {got}", _one_of(word, known, spot.about)
+    if kind == "list_type" and isinstance(details["input"], str | int | float):
+        return f"must be a list, got {got}", f"Write {spot.keys[-1]} = [{got}]. It means: {spot.about}."
     said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)

@@ -18,6 +18,7 @@ from stickslip.units import HZ, RPM
 
 COULOMB = ("elastic_coulomb", "coupled_coulomb", "regularised_coulomb")  # friction under the normal force
 ASIDE = 0.04  # of a frequency, that a proposed range leaves beside it
+MOVED = 1.25  # largest ratio of stuck and open frequencies that are taken for one mode
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -141,12 +142,14 @@ def no_resonance(question: Question) -> tuple[Verdict, ...]:
 
 
 def proposed(question: Question) -> str:
-    """Return the key and a range of it that holds the nearest resonance, between open and stuck contacts, in words."""
+    """Return the key and a range of it that holds the nearest resonance, with open and stuck contacts if these are near, in words."""
     lowest, highest = question.driven_hz
     states = [hertz[hertz > STILL_HZ] for hertz in question.natural_states]
     off = [np.maximum(lowest - hertz, hertz - highest) for hertz in states]
-    ends = [float(hertz[np.argmin(far)]) for hertz, far in zip(states, off, strict=True) if hertz.size]
-    return range_around(question, min(ends), max(ends))
+    ends = {float(hertz[np.argmin(far)]) for hertz, far in zip(states, off, strict=True) if hertz.size}
+    near = min(ends, key=lambda f: max(lowest - f, f - highest))
+    together = [f for f in ends if max(f, near) < MOVED * min(f, near)]
+    return range_around(question, min(together), max(together))
 
 
 def range_around(question: Question, low: float, high: float) -> str:
