@@ -57,3 +57,15 @@ def displacements(printed: str) -> FloatArray:
         rows.append([float(word) for word in words])
     table = np.array(rows)
     return table[np.argsort(table[:, 0]), 1:]
+
+
+def integration_stresses(printed: str) -> FloatArray:
+    """Return the stresses (n, 6) of the static step at integration points, order xx, yy, zz, xy, yz, xz, in the file's order."""
+    _, _, body = printed.partition("stresses (elem, integ.pnt.")
+    rows = []
+    for line in body.splitlines()[2:]:
+        words = line.split()
+        if len(words) < 8:
+            break
+        rows.append([float(word) for word in words[2:8]])
+    return np.array(rows)[:, [0, 1, 2, 3, 5, 4]]
