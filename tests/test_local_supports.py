@@ -1,6 +1,7 @@
 """Harmonics of each coordinate (Maple, Grolet; Gastaldi & Berruti 2017, section 4.5.2.1), against the plain twin of `test_rivals`."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from stickslip.harmonic.harmonic_set import joined, kept_by_dof, of_all, support
 from stickslip.harmonic.harmonics_per_dof import LocalBalance
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.maple import Maple
+from stickslip.harmonic.selection.strategy import Verdict
+from stickslip.response.forced.passages import _more
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 
@@ -173,3 +176,23 @@ def test_through_the_frequencies_and_taken_up_again():
         for one, other in zip(rest, points[done:], strict=True):
             assert one.by_dof == other.by_dof
             np.testing.assert_array_equal(one.coefficients, other.coefficients)
+
+
+@pytest.mark.parametrize(
+    ("by_dof", "again", "again_by_dof", "expected"),
+    [
+        (None, None, None, (None, None)),
+        (None, (1,), None, (None, None)),
+        (None, (0, 3), None, ((0, 1, 3), None)),
+        (None, None, ((0, 1), (0, 3)), ((0, 1, 3), ((0, 1), (0, 1, 3)))),
+        (None, None, ((0,), (0, 1)), (None, None)),
+        (((0, 1), (0,)), (0, 3), None, ((0, 1, 3), ((0, 1, 3), (0, 3)))),
+        (((0, 1), (0,)), None, ((0,), (0, 2)), ((0, 1, 2), ((0, 1), (0, 2)))),
+        (((0, 1), (0,)), None, ((1,), (0,)), (None, None)),
+        (((0, 1), (0,)), None, None, (None, None)),
+    ],
+)
+def test_a_repeat_has_new_harmonics_of_all_coordinates_or_of_some(by_dof, again, again_by_dof, expected):
+    problem = SimpleNamespace(low=SimpleNamespace(linear=SimpleNamespace(n=2)))
+    verdict = Verdict(1.0, again, (0, 1), again_by_dof=again_by_dof)
+    assert _more(problem, (0, 1), by_dof, verdict) == expected
