@@ -2,7 +2,14 @@
 
 from .card import StrengthCard as StrengthCard
 from .cycle import alternating_and_mean as alternating_and_mean
+from .cycle import criterion_doubt as criterion_doubt
+from .cycle import critical_plane as critical_plane
+from .cycle import crossland as crossland
+from .cycle import dang_van as dang_van
+from .cycle import enclosing_ball as enclosing_ball
 from .cycle import history as history
+from .cycle import signed_von_mises as signed_von_mises
+from .cycle import sines as sines
 from .cycle import von_mises as von_mises
 from .haigh import HaighTable as HaighTable
 from .haigh import Hardening as Hardening
