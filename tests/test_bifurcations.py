@@ -8,10 +8,14 @@ import pytest
 import scipy.integrate
 
 import stickslip as ss
+from evidence.models.lumped import griffin
 from evidence.validation.case_bifurcations import absorber
 from stickslip.errors import InputError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations import bifurcations, side_branches, subharmonic_branch
+from stickslip.response.bifurcations.period_multiplied import in_periods, over_periods
+from stickslip.response.forced.response import forced_problem, forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import Stability, stability
 from stickslip.response.stability.found import Floquet
 from stickslip.solve.status import Status
@@ -328,3 +332,25 @@ def test_a_torus_of_an_absorber_lies_where_shooting_has_it():
     assert (found.kind, found.before, found.after) == ("Neimark-Sacker", 0, 2)
     assert abs(found.omega - 1.1092820) <= max(found.omega_error, 1e-6) < 1e-3
     assert 0.0 < found.beat < found.omega / 2
+
+
+@pytest.mark.parametrize("more", [{"frequencies": 5}, {"at": (0.9, 1.0)}, {"points": 7}])
+def test_a_problem_over_several_periods_has_their_harmonics_and_no_frequencies_of_its_own(more):
+    """Three periods of the load are one: a third of the frequency, harmonics up to three times the highest."""
+    system, load = griffin(0.1)
+    problem = forced_problem(system, load, Sweep(omega_range=(0.8, 1.3), samples=64, high=3, **more))
+    own = over_periods(problem, 3, 5)
+    assert own.sweep.grid.size == 0
+    assert own.sweep.omega_range == pytest.approx((0.8 / 3, 1.3 / 3))
+    assert own.low.harmonics == own.high.harmonics == tuple(range(16))
+    assert own.low.samples == 192
+    point = next(iter(forced_response(system, load, problem.sweep)))
+    long = in_periods(point, 3)
+    assert long.omega == point.omega / 3
+    np.testing.assert_array_equal(long.coefficients[::3], point.coefficients)
+    assert np.count_nonzero(long.coefficients) == np.count_nonzero(point.coefficients)
+    assert long.harmonics.tolist() == list(range(3 * point.order + 1))
+    assert (long.kept.size, long.kept.dtype) == (0, np.int64)
+    # the same motion: the residual over three periods is that over one
+    balance = over_periods(problem, 3, point.order).low
+    assert np.abs(balance.linearise(balance.unknowns(long.coefficients), long.omega).residual).max() < 1e-6
