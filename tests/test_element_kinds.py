@@ -336,6 +336,18 @@ def test_frequencies_of_calculix(tmp_path, case):
     np.testing.assert_allclose(found[:few], theirs[:few], rtol=tolerance)
 
 
+@pytest.mark.parametrize("inner", ["mean", "centre"])
+def test_the_centrifugal_load_of_bricks_with_inner_modes_acts_on_their_nodes_alone(inner):
+    """As in CalculiX: ``∫ ρ N r dV`` of the nodes' functions, although the mass is condensed."""
+    mesh = mesh_of("hex", wave=0.0015)
+    free = SolidMesh(mesh.points, mesh.cells, {})
+    plain, rich = (
+        rotating_solid(free, STEEL, quadrature=Quadrature(stiffness=3, mass=4, inner=own)) for own in ("", inner)
+    )
+    np.testing.assert_allclose(rich.centrifugal, plain.centrifugal, atol=1e-12 * np.abs(plain.centrifugal).max())
+    assert abs(rich.structure.mass - plain.structure.mass).max() > 1e-3 * abs(plain.structure.mass).max()
+
+
 def test_inner_modes_converge_to_those_with_their_own_mass(tmp_path):
     """The block of twice as many bricks: condensation costs a quarter, as the modes' own frequencies are twice as high."""
     coarse, fine = {}, {}
