@@ -204,6 +204,13 @@ def test_signed_von_mises_of_tension_that_reverses():
     np.testing.assert_allclose([amplitude[0], mean[0], turn[0]], [80 * MPA, -30 * MPA, 0], rtol=1e-9)
 
 
+def test_signed_von_mises_of_torsion_that_reverses_has_both_signs():
+    amplitude, mean, turn = sg.signed_von_mises(bending_and_torsion(0, 50))
+    np.testing.assert_allclose([amplitude[0], mean[0], turn[0]], [50 * np.sqrt(3) * MPA, 0, 0], rtol=1e-9, atol=1e-3)
+    amplitude, mean, _ = sg.signed_von_mises(bending_and_torsion(80, 50))
+    np.testing.assert_allclose([amplitude[0], mean[0]], [np.hypot(80, 50 * np.sqrt(3)) * MPA, 0], rtol=1e-9, atol=1e-3)
+
+
 @pytest.mark.parametrize(("shear", "known"), [(2.0, True), (8.0, True), (9.0, False)])
 def test_signed_von_mises_is_given_where_axes_turn_less_than_ten_degrees(shear, known):
     own = harmonics([100 * MPA, 0, 0, 0, 0, 0], [0, 0, 0, shear * MPA, 0, 0])

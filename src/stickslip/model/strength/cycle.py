@@ -31,7 +31,7 @@ BEST_PLANES = 3  # of the coarse ones, from which the search goes on
 FINEST_STEP = 1e-3  # angle at which the search ends, rad: a smooth maximum is then right to 1e-6
 GRID_PARTS = 8  # in which the coarse planes are looked at
 LAST_CHOICE = 0.02  # step of the search below which only the best plane is followed, rad
-PLACES_AT_ONCE = 1000  # whose shear paths are held in memory together
+PLACES_AT_ONCE = 200  # whose shear paths are held in memory together
 DOUBTFUL_TORSION = 0.8  # torsion limit over fatigue limit, above which metals are brittle and criteria doubtful
 DOUBTFUL_LIMIT = 1.1  # predicted over stated limit, above which a criterion does not fit the card
 # limit in torsion over that in tension of a material that obeys von Mises
@@ -95,8 +95,9 @@ def signed_mean(stress: FloatArray) -> FloatArray:
 def signed_von_mises(harmonics: ComplexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return amplitude, mean (k,) in Pa and turn of axes (k,) in degrees of the equivalent stress signed by the largest principal.
 
-    The turn is twice the largest angle between the principal axes and the axes that fit all samples best. Where it is 10 degrees or
-    more, signs jump while the stress is large: amplitude and mean are NaN.
+    The sign is that of the stress along one axis, on which the largest principal stress of the cycle lies: torsion that reverses
+    changes its sign. The turn is twice the largest angle between the principal axes and the axes that fit all samples best. Where
+    it is 10 degrees or more, signs jump while the stress is large: amplitude and mean are NaN.
 
     Parameters
     ----------
@@ -104,12 +105,20 @@ def signed_von_mises(harmonics: ComplexArray) -> tuple[FloatArray, FloatArray, F
         (H+1, k, 6) complex amplitudes of the stress at k places in Pa.
     """
     given = _checked(harmonics)
-    turn = _where_finite(_axes_turn_deg, given)
-    steady = turn < MAX_AXES_TURN_DEG
-    fit = np.where(steady[:, None], given, np.nan)
-    largest = _where_finite(lambda own: _zoomed_maximum(own, signed_mean), fit)
-    smallest = _where_finite(lambda own: -_zoomed_maximum(own, lambda stress: -signed_mean(stress)), fit)
-    return (largest - smallest) / 2, (largest + smallest) / 2, turn
+    turn = _where_finite(lambda own: _common_axes(own)[1], given)
+    fit = np.where((turn < MAX_AXES_TURN_DEG)[:, None], given, np.nan)
+
+    def largest(own: ComplexArray, side: float) -> FloatArray:
+        along = _common_axes(own)[0]
+
+        def signed(stress: FloatArray) -> FloatArray:
+            normal = np.einsum("nkij,ki,kj->nk", stress[..., TENSOR], along, along)
+            return np.asarray(side * np.where(normal < 0, -1, 1) * von_mises(stress))
+
+        return _zoomed_maximum(own, signed)
+
+    high, low = (_where_finite(lambda own, side=side: side * largest(own, side), fit) for side in (1, -1))
+    return (high - low) / 2, (high + low) / 2, turn
 
 
 def crossland(harmonics: ComplexArray, card: StrengthCard, *, credit_in_compression: bool = False) -> FloatArray:
@@ -443,19 +452,23 @@ def _zoomed(
     return np.asarray(found)
 
 
-def _axes_turn_deg(harmonics: ComplexArray) -> FloatArray:
-    """Return twice the largest angle (k,) between principal axes and the axes in which all samples are most nearly diagonal."""
+def _common_axes(harmonics: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return the axis (k, 3) of the largest normal stress among those in which all samples are most nearly diagonal, and the turn.
+
+    The turn (k,) is twice the largest angle between these axes and the principal ones, in degrees.
+    """
     tensors = _sampled(harmonics, _samples(harmonics))[..., TENSOR]
+    axes: FloatArray = np.tile(np.eye(3), (tensors.shape[1], 1, 1))
     for _ in range(JACOBI_SWEEPS):
         for i, j in ((0, 1), (1, 2), (0, 2)):
             # Cardoso and Souloumiac (1996): the angle that makes the sum of the squared shears of all samples smallest
             difference, shear = tensors[..., i, i] - tensors[..., j, j], 2 * tensors[..., i, j]
             on, off = (difference**2 - shear**2).sum(axis=0), 2 * (difference * shear).sum(axis=0)
-            angle = np.arctan2(off, on + np.hypot(on, off)) / 2
+            angle = np.arctan2(off, on) / 4
             turn = np.tile(np.eye(3), (len(angle), 1, 1))
             turn[:, i, i] = turn[:, j, j] = np.cos(angle)
             turn[:, i, j], turn[:, j, i] = -np.sin(angle), np.sin(angle)
-            tensors = turn.swapaxes(1, 2) @ tensors @ turn
+            tensors, axes = turn.swapaxes(1, 2) @ tensors @ turn, axes @ turn
     stress = np.stack([tensors[..., i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], axis=-1)
     largest = von_mises(stress).max(axis=0)
     angles = [
@@ -466,7 +479,11 @@ def _axes_turn_deg(harmonics: ComplexArray) -> FloatArray:
         )
         for i, j in ((0, 1), (1, 2), (0, 2))
     ]
-    return np.asarray(2 * np.degrees(np.max(angles, axis=(0, 1))))
+    sizes = np.abs(np.diagonal(tensors, axis1=2, axis2=3)).max(axis=0)
+    # of equal sizes, as in torsion, any serves: the first, whatever rounding says
+    first = (sizes >= sizes.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
+    along = np.take_along_axis(axes, first[:, None, None], axis=2)[..., 0]
+    return along, np.asarray(2 * np.degrees(np.max(angles, axis=(0, 1))))
 
 
 def _paths_on_planes(harmonics: ComplexArray, normals: FloatArray) -> tuple[ComplexArray, ComplexArray]:
