@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.sparse
 
 import stickslip as ss
-from stickslip.response.rotating.cyclic_campbell import cyclic_campbell
+from stickslip.response.rotating.campbell import cyclic_campbell
 
 SPIN = np.array([[0.0, -1.0], [1.0, 0.0]])
 TWO_PI = 2 * np.pi

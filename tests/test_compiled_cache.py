@@ -11,7 +11,6 @@ import pytest
 
 import stickslip.contact
 from stickslip.contact import cache as compiled_cache
-from stickslip.contact import cache_files
 
 SOURCE = """
 from typing import NamedTuple
@@ -133,7 +132,7 @@ def test_a_file_of_another_function_or_age_is_not_taken(tmp_path, monkeypatch):
 @pytest.mark.parametrize("other", ["folder", "nothing"])
 def test_what_is_no_file_costs_a_compilation(tmp_path, monkeypatch, other):
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setenv(cache_files._TOLD, "yes")
+    monkeypatch.setenv(compiled_cache._TOLD, "yes")
     (tmp_path / "several.py").write_text(SEVERAL)
     called(monkeypatch, "several")
     for path in tmp_path.rglob("*.nbi"):
@@ -190,12 +189,12 @@ def times(x):
 
 def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(cache_files, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(compiled_cache, "_PACKAGE", tmp_path)
     # Python tells files of the same second and size apart by nothing, and would load the first one's bytecode
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     (tmp_path / "user.py").write_text(USER)
     for factor in (2.0, 3.0, 3.0):
-        cache_files._contents.cache_clear()
+        compiled_cache._contents.cache_clear()
         (tmp_path / "used.py").write_text(USED.format(factor=factor))
         for name in ("user", "stickslip.used"):
             sys.modules.pop(name, None)
@@ -222,7 +221,7 @@ def test_what_takes_long_to_compile_is_said_once(patience, monkeypatch, caplog):
 
 ASKED = """
 import numba
-from stickslip.contact import event_integrals, events, interface, intervals, march, prescribed_gap, product
+from stickslip.contact import event_integrals, events, interface, intervals, law_steps, march, product
 from stickslip.contact.planar import period, sensitivities, trajectory
 from stickslip.response import precompile
 from stickslip.response.time.stepping import time_step
@@ -234,7 +233,7 @@ used = [
     event_integrals._integrate_events, events.contact_events, interface.add_contact_jacobian, interface.add_forces, interface.add_gaps,
     intervals.contact_period, product.contact_product, product.multiply_blocks, product.sweep, trajectory.run, sensitivities.follow_rows,
 ]
-made = [march.period_march, prescribed_gap._walk, period._compiled, start._march, time_step.run_steps]
+made = [march.period_march, law_steps._walk, period._compiled, start._march, time_step.run_steps]
 if numba.get_num_threads() > 1:
     used += [events.contact_events_threads, intervals.contact_period_threads]
     made += [period._threads]

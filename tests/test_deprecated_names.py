@@ -8,12 +8,12 @@ import xarray as xr
 import stickslip as ss
 from stickslip.contact import neighbours
 from stickslip.response import rigid
-from stickslip.response.rotating import cyclic_campbell
+from stickslip.response.rotating import campbell
 
 GONE_SOON = [
     (ss.response, "rigid_response", rigid, "forced_response solves rigid contacts"),
     (ss.response, "RigidPoint", rigid, "forced_response solves rigid contacts"),
-    (ss.response, "cyclic_campbell", cyclic_campbell, "travelling_wave of each wave number"),
+    (ss.response, "cyclic_campbell", campbell, "travelling_wave of each wave number"),
     (ss.contact, "neighbour_interface", neighbours, "next.PART.SURFACE"),
     (ss.contact, "neighbour_gaps", neighbours, "next.PART.SURFACE"),
 ]

@@ -11,8 +11,7 @@ import stickslip as ss
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS, law_kernel
 from stickslip.contact.laws import LAWS
-from stickslip.response.time.period_map import PeriodMap, period_map
-from stickslip.response.time.shooting import shoot
+from stickslip.response.time.shooting import PeriodMap, period_map, shoot
 from stickslip.response.time.start import rest, start_from_harmonics
 from stickslip.response.time.stepping import step_tangent
 from stickslip.response.time.stepping.marcher import Marcher, prepared

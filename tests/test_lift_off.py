@@ -17,7 +17,7 @@ from stickslip.errors import InputError
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.from_time import found_in_time, marched_of
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
-from stickslip.response.time.repeating import Repetition, repetition
+from stickslip.response.time.settling import Repetition, repetition
 from stickslip.response.time.stepping.marcher import ROUGH
 from stickslip.solve.status import Rung, Status
 

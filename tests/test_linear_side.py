@@ -22,8 +22,7 @@ from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.travelling import TravellingStiffness, condense_side
-from stickslip.harmonic.wave_condensation import ModalWave, SolvedWave, condense_wave
+from stickslip.harmonic.travelling import ModalWave, SolvedWave, TravellingStiffness, condense_side, condense_wave
 from stickslip.model.structure import Structure, modal_dofs
 from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import travelling_wave

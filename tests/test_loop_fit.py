@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli import app
-from stickslip.contact.prescribed_gap import forces_along
+from stickslip.contact.law_steps import forces_along
 from stickslip.errors import InputError
 from stickslip.study.file.model.contacts import ContactTable
 

@@ -29,8 +29,7 @@ from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.joints.pairs import at_rest
 from stickslip.assembly.sides.deviations import Blade, blade_alone, blade_alone_hz
-from stickslip.assembly.sides.mistuned import changed
-from stickslip.assembly.sides.wheel_modes import wheel_modes
+from stickslip.assembly.sides.mistuned import changed, wheel_modes
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
 from stickslip.harmonic.dynamic_stiffness import condense

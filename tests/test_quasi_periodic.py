@@ -10,7 +10,7 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.harmonic.judging import judging_indices
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.two_frequency_path import closed_path, half_plane, torus_basis
+from stickslip.harmonic.two_frequency import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic import in_time
 from stickslip.response.quasi_periodic.in_time import course, statistics

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from transient_models import load_of, structure_of
 
 import stickslip as ss
-from stickslip.response.time import repeating
-from stickslip.response.time.repeating import Repetition, repetition
+from stickslip.response.time import settling
+from stickslip.response.time.settling import Repetition, repetition
 
 NORMAL, ALONG = np.array([[0.0], [0.0], [-1.0]]), np.array([[1.0], [0.0], [0.0]])
 
@@ -58,7 +58,7 @@ def test_an_impact_that_a_step_is_too_long_for_is_looked_at_with_shorter_ones() 
 
 
 def seen(change: float, **other: object) -> Repetition:
-    changes = np.full(2 * repeating.PERIODS - 1, change)
+    changes = np.full(2 * settling.PERIODS - 1, change)
     return Repetition(
         np.zeros((2, 1)),
         changes,

@@ -17,9 +17,8 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import PeakProblem
 from stickslip.model.matrices import lumped
 from stickslip.response.parameter import Discretisation
-from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.first import PeakSearch, maxima
-from stickslip.response.resonances.tracking import follow_peaks, later_peaks
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks, peak_curve
 from stickslip.response.self_excited.curve import at_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions

@@ -15,8 +15,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.stability.found import Floquet, floquet
 from stickslip.response.time import shooting
-from stickslip.response.time.period_map import PeriodMap, period_map
-from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
+from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, PeriodMap, ShootingResult, period_map, shoot
 from stickslip.response.time.start import TransientStart, rest
 from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, integrate

@@ -14,7 +14,7 @@ from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import accepted_pairs, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.stability import settled, settled_stability, stability
+from stickslip.response.stability import multipliers, settled_stability, stability
 from stickslip.response.stability.course import course_of, cycle_of, has_transitions, sign_of
 from stickslip.response.stability.found import NEUTRAL, Floquet, Stability, changes, may_leave
 from stickslip.response.system import System
@@ -53,7 +53,7 @@ def test_no_motion_is_solved_without_need(monkeypatch):
     """Each motion that is solved with more harmonics has its multipliers taken: none is solved when the verdict is known."""
     problem, points = stopped(Sweep(omega_range=(0.85, 1.35), points=12, peak_points=0, low=1, high=3))
     solved, taken = [], []
-    more_harmonics, of_point = settled.more_harmonics, settled.of_point
+    more_harmonics, of_point = multipliers.more_harmonics, multipliers.of_point
 
     def solving(*given):
         for more in more_harmonics(*given):
@@ -64,8 +64,8 @@ def test_no_motion_is_solved_without_need(monkeypatch):
         taken.append(point)
         return of_point(problem, point)
 
-    monkeypatch.setattr(settled, "more_harmonics", solving)
-    monkeypatch.setattr(settled, "of_point", taking)
+    monkeypatch.setattr(multipliers, "more_harmonics", solving)
+    monkeypatch.setattr(multipliers, "of_point", taking)
     by_one_step = 0
     for point in points:
         before = len(solved), len(taken)
@@ -200,7 +200,7 @@ def with_another_verdict(monkeypatch, order: int, size: float) -> None:
         pair = np.full(2, size if point.order <= order else 0.9, dtype=complex)
         return Stability(Floquet(pair), np.zeros(2), 0, 0, 4)
 
-    monkeypatch.setattr("stickslip.response.stability.settled.of_point", told)
+    monkeypatch.setattr("stickslip.response.stability.multipliers.of_point", told)
 
 
 @pytest.mark.parametrize(("size", "away", "another"), [(1.2, 0.004, True), (0.95, 0.02, True), (0.95, 0.004, False)])

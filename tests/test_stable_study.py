@@ -53,7 +53,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
 from stickslip.response.stability.found import Floquet
-from stickslip.response.stability.settled import Settled
+from stickslip.response.stability.multipliers import Settled
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analysis import Solved

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from solid_models import box
 
-from stickslip.assembly.joints.untied_faces import MeetingFaces, _sets, meeting_faces, uncoupled, untied_faces
+from stickslip.assembly.joints.cyclic_faces import MeetingFaces, _sets, meeting_faces, uncoupled, untied_faces
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material

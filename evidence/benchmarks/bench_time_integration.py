@@ -35,9 +35,8 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.response.time.period_map import period_map
 from stickslip.response.time.settling import period_harmonics
-from stickslip.response.time.shooting import ShootingResult, shoot
+from stickslip.response.time.shooting import ShootingResult, period_map, shoot
 from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate

@@ -21,8 +21,7 @@ import numpy as np
 from evidence.benchmarks.bench_lift_off import ORDER, sweep_over
 from evidence.models.many_contacts import Plates, two_plates
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
-from stickslip.response.time.repeating import repetition
-from stickslip.response.time.settling import period_harmonics
+from stickslip.response.time.settling import period_harmonics, repetition
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.response.time.stepping.marcher import Marcher, prepared
 

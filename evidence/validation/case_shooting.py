@@ -17,8 +17,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced.response import Sweep, forced_problem
 from stickslip.response.system import System
-from stickslip.response.time.period_map import period_map
-from stickslip.response.time.shooting import ShootingResult, shoot
+from stickslip.response.time.shooting import ShootingResult, period_map, shoot
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.response.time.stepping.marcher import prepared
 from stickslip.response.time.transient import TimeStepping, integrate

@@ -12,10 +12,10 @@ from stickslip.assembly.assembled import Skin
 from stickslip.assembly.contact import ALONE, Contact, Join
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.forces import Load, Output, beyond_sectors, doubtful_fields, engine_order, far_outputs
+from stickslip.assembly.joints.cyclic_faces import uncoupled, untied_faces
 from stickslip.assembly.joints.pairs import Pairs, pair_contacts
 from stickslip.assembly.joints.surface_checks import refuse_contacts_of_dofs, refuse_joined
 from stickslip.assembly.joints.ties import Coordinates, Ties, coordinates, tie_joins
-from stickslip.assembly.joints.untied_faces import uncoupled, untied_faces
 from stickslip.assembly.locations import Places, picked
 from stickslip.assembly.part_reduction import Spin, Steady, at_speed, damped, is_loaded, steady_of
 from stickslip.assembly.sides.mistuning import Mistuning

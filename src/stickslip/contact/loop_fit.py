@@ -16,8 +16,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.law_steps import forces_along
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.prescribed_gap import forces_along
 from stickslip.errors import input_error
 
 RIGID_STIFFNESS = 1e6  # times the force range over the displacement range: a spring that slips almost at once

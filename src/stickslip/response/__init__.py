@@ -13,7 +13,7 @@ _BY_WAVE = "call campbell with the travelling_wave of each wave number"
 _DEPRECATED = {
     "rigid_response": ("rigid", _BY_SWEEP),
     "RigidPoint": ("rigid", _BY_SWEEP),
-    "cyclic_campbell": ("rotating.cyclic_campbell", _BY_WAVE),
+    "cyclic_campbell": ("rotating.campbell", _BY_WAVE),
 }
 
 

@@ -14,11 +14,11 @@ from .recovery import Fields as Fields
 from .recovery import Signals as Signals
 from .recovery import fields as fields
 from .recovery import signals as signals
-from .resonances.curve import peak_curve as peak_curve
 from .resonances.first import PeakSearch as PeakSearch
 from .resonances.point import PeakPoint as PeakPoint
 from .resonances.tracking import follow_peaks as follow_peaks
 from .resonances.tracking import later_peaks as later_peaks
+from .resonances.tracking import peak_curve as peak_curve
 from .resonances.tracking import smallest_peak as smallest_peak
 from .resonances.tracking import track_peak as track_peak
 from .rotating.campbell import Campbell as Campbell

@@ -11,10 +11,10 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
+from stickslip.contact.law_steps import forces_along
 from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.contact.prescribed_gap import forces_along
 from stickslip.contact.threads import CONTACTS_WORTH_THREADS
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import JacobianForm, harmonic_balance

@@ -15,7 +15,7 @@ from stickslip.analyses.quasi_periodic.verdicts import case_verdicts, tables
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
-from stickslip.harmonic.two_frequency_path import Indices, TorusPath
+from stickslip.harmonic.two_frequency import Indices, TorusPath
 from stickslip.response.quasi_periodic.in_time import second_tone_in_time, two_loads_in_time
 from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, with_enough
 from stickslip.response.quasi_periodic.tone import growing_tones, solve_free, swept, tone_beside

@@ -13,7 +13,7 @@ from stickslip.analyses.waves.tables import FlutterTable
 from stickslip.analyses.waves.verdicts import PERCENT, energy_doubts, flutter_tables, unstable, unstable_wheel
 from stickslip.assembly.build import flow_around
 from stickslip.assembly.model import Model
-from stickslip.assembly.sides.wheel_modes import wheel_in_flow
+from stickslip.assembly.sides.mistuned import wheel_in_flow
 from stickslip.errors import input_error
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
 from stickslip.reduction.waves import wave

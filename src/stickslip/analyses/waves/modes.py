@@ -25,7 +25,7 @@ from stickslip.analyses.waves.tables import ModesTable
 from stickslip.analyses.waves.verdicts import modes_tables
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
-from stickslip.assembly.sides.wheel_modes import wheel_modes
+from stickslip.assembly.sides.mistuned import wheel_modes
 from stickslip.errors import input_error, missing_file
 from stickslip.reduction.waves import wave
 from stickslip.study.analysis import Case, Notes, Solved

@@ -8,7 +8,7 @@ import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import ALONE, NEXT, SPATIAL, Join
-from stickslip.assembly.joints.nonmatching_cyclic_faces import unlike_faces
+from stickslip.assembly.joints.cyclic_faces import unlike_faces
 from stickslip.assembly.joints.pairs import Pairs, Turn
 from stickslip.assembly.joints.ties import MEAN, Coordinates, Ties
 from stickslip.assembly.locations import Places, picked, stacked

@@ -41,7 +41,7 @@ from stickslip.response.continuation.starting_solutions import plain_sweep
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point, with_stiffness
 from stickslip.response.stability.missing_harmonics import corrected
-from stickslip.response.stability.settled import stability
+from stickslip.response.stability.multipliers import stability
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point

@@ -16,7 +16,7 @@ from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.bifurcations.found import Bifurcation, BifurcationKind, Bifurcations
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.stability.found import UNIT_TOLERANCE, Stability
-from stickslip.response.stability.settled import stability
+from stickslip.response.stability.multipliers import stability
 from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.branch_events import FOLD, Mark, located
 from stickslip.solve.continuation import start_point

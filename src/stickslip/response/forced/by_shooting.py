@@ -11,9 +11,8 @@ from stickslip.harmonic.linear import one_structure
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.choices import Stage
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, Shot, forced_problem
 from stickslip.response.forced.resonance import peak_vertex
-from stickslip.response.forced.shot import Shot
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.response.time.shooting import ShootingResult, shoot

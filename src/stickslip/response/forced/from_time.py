@@ -12,7 +12,7 @@ from stickslip.errors import StickslipError
 from stickslip.harmonic.harmonic_set import is_full
 from stickslip.response.continuation.branch import Judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.time.repeating import Repetition, repetition
+from stickslip.response.time.settling import Repetition, repetition
 from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.fallbacks import steps_at_most
 from stickslip.solve.line_search import NaturalLevel
@@ -26,7 +26,7 @@ MORE = (2, 4, 6, 10)  # additional harmonics to try
 
 @dataclass(frozen=True)
 class Marched:
-    """Time integration from rest; see `stickslip.response.time.repeating.Repetition`.
+    """Time integration from rest; see `stickslip.response.time.settling.Repetition`.
 
     Fields with ``finer`` come from a second integration with half the step; NaN where it was not needed.
 

@@ -13,12 +13,15 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.travelling import condense_side
 from stickslip.harmonic.two_frequency import (
     MAX_DENSE_UNKNOWNS,
+    Indices,
     TorusBalance,
     TorusLinearisation,
+    TorusPath,
     TorusSide,
+    closed_path,
+    half_plane,
     torus_balance,
 )
-from stickslip.harmonic.two_frequency_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.response.equilibrium import preload

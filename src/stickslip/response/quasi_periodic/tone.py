@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.two_frequency_path import TorusPath
+from stickslip.harmonic.two_frequency import TorusPath
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.operators import Bordered, Jacobian
 from stickslip.response.forced.accepted import accepted_points
