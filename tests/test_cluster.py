@@ -23,7 +23,7 @@ from stickslip.errors import InputError
 from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import run_study
 from stickslip.study.store import workers
-from stickslip.study.store.attempts import reached
+from stickslip.study.store.journal import reached
 from stickslip.study.store.workers import LOOPBACK
 from stickslip.study.verdict import of_tree
 
@@ -47,7 +47,7 @@ import sys
 from pathlib import Path
 from stickslip.study.questions import ANALYSES, Home
 from stickslip.study.run import run_study
-from stickslip.study.shard import Shard
+from stickslip.study.run import Shard
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
     ANALYSES["toy"] = Home("slow_toy:TOY")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.analyses.forced_response.physics.statics import angle_sentence, slip_sentence
+from stickslip.analyses.forced_response.physics.limits import angle_sentence, slip_sentence
 from stickslip.response.damper_statics import Flank, largest_ratios, statics_of
 
 PULL = np.array([0.0, 0.0, 1.0])

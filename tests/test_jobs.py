@@ -20,12 +20,10 @@ from toy_analysis import ToyStudy
 from stickslip.errors import InputError, StickslipError
 from stickslip.study import jobs, run
 from stickslip.study.questions import ANALYSES, Home
-from stickslip.study.run import run_study
-from stickslip.study.shard import Shard
+from stickslip.study.run import Shard, run_study
 from stickslip.study.store import folder as keep_folder
-from stickslip.study.store.attempts import begin, clear, file_at_work, left_behind
 from stickslip.study.store.folder import locked_folder
-from stickslip.study.store.journal import JobJournal, read_sealed
+from stickslip.study.store.journal import JobJournal, begin, clear, file_at_work, left_behind, read_sealed
 from stickslip.study.store.netcdf import read_tree
 from stickslip.study.store.watch import solve_far, watched
 from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped, memory_gb

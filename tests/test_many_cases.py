@@ -18,10 +18,10 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts import working_range
 from stickslip.analyses.forced_response.verdicts.working_range import WorkingRange
 from stickslip.report.cases import cases_of, families_of
-from stickslip.report.content import Words
 from stickslip.report.paper.figure import draw
+from stickslip.report.section import Words
+from stickslip.study.coordinates import families
 from stickslip.study.file.case_names import Naming, shortened, without_common_words
-from stickslip.study.varied import families
 
 FORCE, MASS, MU = "load.shaker.force_n", "part.damper.mass_kg", "contact.flat.friction_coefficient"
 

@@ -12,8 +12,8 @@ import scipy.sparse
 from cyclic_models import wedge
 
 import stickslip as ss
+from stickslip.analyses.waves.modes import each_diameter, flange_doubts, unreached
 from stickslip.analyses.waves.records import WaveModes
-from stickslip.analyses.waves.stages import each_diameter, flange_doubts, unreached
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh

@@ -66,7 +66,7 @@ def test_every_public_name_serves_a_task(generate: ModuleType) -> None:
 
 def test_files_and_modules_that_pages_name_exist() -> None:
     root = DOCS.parent
-    files = {str(p.relative_to(root)) for p in root.rglob("*.py") if not {".venv", "build"} & set(p.parts)}
+    files = {str(p.relative_to(root)) for p in root.rglob("*.py") if not {".venv", "build", "out"} & set(p.parts)}
     names = {f"/{name}" for name in files}
     pages = [*DOCS.rglob("*.md"), root / "README.md", root / "CONTRIBUTING.md"]
     found = [

@@ -25,8 +25,13 @@ from stickslip.analyses.forced_response.page.at_peak.contacts import hysteresis_
 from stickslip.analyses.forced_response.page.chapter import cards, peaks
 from stickslip.analyses.forced_response.page.checks import stability, statistics_in_time, time_integration
 from stickslip.analyses.forced_response.page.curves import frequency_response
-from stickslip.analyses.forced_response.page.errors import errors
-from stickslip.analyses.forced_response.page.harmonics import choice, flagged_ranges, kept_harmonics, more_harmonics
+from stickslip.analyses.forced_response.page.harmonics import (
+    choice,
+    errors,
+    flagged_ranges,
+    kept_harmonics,
+    more_harmonics,
+)
 from stickslip.analyses.forced_response.page.optimisation import optimisation
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
 from stickslip.analyses.inputs import Varied, as_run, inputs, told
@@ -36,11 +41,11 @@ from stickslip.api.as_tables import as_tables
 from stickslip.api.model import Model
 from stickslip.assembly.forces import Load
 from stickslip.errors import InputError
-from stickslip.report.content import Table
 from stickslip.report.frame import Chapter, Placing, page_html
 from stickslip.report.plot import Plot, log_ticks, styled
 from stickslip.report.quantities import amplitude, column, number, percent, quantity, runs, scale_for
 from stickslip.report.result import Node
+from stickslip.report.section import Table
 from stickslip.report.tiles import patches, triangulated
 from stickslip.study.file.case_names import without_common_words
 from stickslip.study.questions import ANALYSES, Home
@@ -815,10 +820,9 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
 def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     from plotly import graph_objects as go
 
-    from stickslip.report.content import Words
     from stickslip.report.plot import Plot
     from stickslip.report.result import Node
-    from stickslip.report.section import Block, Section
+    from stickslip.report.section import Block, Section, Words
 
     def figure(node: Node) -> Plot:
         return Plot("toy", "A toy", "Its answer.", go.Figure([go.Scatter(y=node.floats("answer"))]))

@@ -18,8 +18,7 @@ from toy_analysis import TOY, ToyStudy
 from stickslip.errors import InputError
 from stickslip.study.analysis import Solved
 from stickslip.study.questions import ANALYSES, Home
-from stickslip.study.run import answer, run_study
-from stickslip.study.shard import Shard
+from stickslip.study.run import Shard, answer, run_study
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.netcdf import read_tree
 from stickslip.study.store.progress import DONE, LOG, Interrupted

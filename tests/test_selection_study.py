@@ -15,8 +15,7 @@ from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.analyses.forced_response import analysis
 from stickslip.analyses.forced_response.chooser import _audited
-from stickslip.analyses.forced_response.page.errors import errors
-from stickslip.analyses.forced_response.page.harmonics import choice, kept_harmonics
+from stickslip.analyses.forced_response.page.harmonics import choice, errors, kept_harmonics
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import strategy_named

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import ALONE, Question
 from stickslip.analyses.forced_response.records.points import Response, collect
-from stickslip.analyses.forced_response.stability import examination, in_time, stable, with_stability
+from stickslip.analyses.forced_response.stability import examination, examining, in_time, stable
 from stickslip.analyses.forced_response.stability.examining import (
     CARRIED,
     examined_points,
@@ -206,8 +206,8 @@ def test_nothing_is_examined_or_integrated_twice(decided_in_time: Solved, monkey
     asked, whole = undecided(monkeypatch), decided_in_time
     first = dataset(whole)
     times: list[str] = []
-    monkeypatch.setattr(with_stability, "examine", lambda *_: times.append("examined"))
-    monkeypatch.setattr(with_stability, "check_in_time", lambda *_, **__: times.append("integrated"))
+    monkeypatch.setattr(examining, "examine", lambda *_: times.append("examined"))
+    monkeypatch.setattr(examining, "check_in_time", lambda *_, **__: times.append("integrated"))
 
     class Kept:
         def __init__(self) -> None:
@@ -300,7 +300,7 @@ def test_a_motion_that_has_become_the_largest_is_examined() -> None:
         replace(e, verdict="not examined", basis="not examined") if e.position == response.peak else e
         for e in looked_at(asked, response).values()
     ]
-    told = with_stability._with_peak(response, found, lambda accepted: examine(asked, accepted))
+    told = examining._with_peak(response, found, lambda accepted: examine(asked, accepted))
     assert [e.position for e in told] == sorted(e.position for e in found)
     peak = next(e for e in told if e.position == response.peak)
     assert (peak.verdict, peak.basis) == ("stable", "examined")
@@ -571,8 +571,8 @@ def test_a_model_that_has_no_form_in_time_keeps_its_doubts(monkeypatch: pytest.M
     response = response_of(asked)
     found = list(looked_at(asked, response).values())
     assert any(e.verdict == "undecided" for e in found)
-    monkeypatch.setattr(with_stability, "integrated", refused)
-    assert with_stability._doubts_in_time(asked, response, found, SimpleNamespace()) == found  # type: ignore[arg-type]
+    monkeypatch.setattr(examining, "integrated", refused)
+    assert examining._doubts_in_time(asked, response, found, SimpleNamespace()) == found  # type: ignore[arg-type]
 
 
 def test_a_motion_that_comes_to_rest_has_steps_enough(monkeypatch):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from test_flutter_wheel import forced
 
-from stickslip.analyses.forced_response.stability import with_stability
+from stickslip.analyses.forced_response.stability import examining
 from stickslip.analyses.forced_response.stability.bifurcating import Remembered
+from stickslip.analyses.forced_response.stability.examining import Looked
 from stickslip.analyses.forced_response.stability.stable import Examined, as_note
-from stickslip.analyses.forced_response.stability.with_stability import Looked
 from stickslip.response.stability import hill_stability
 from stickslip.response.stability.hill_method.hill_segment import NODES, Segment
 from stickslip.study import analysis
@@ -76,7 +76,7 @@ def test_points_and_pieces_are_taken_over_and_told(
         found = hill_stability(problem, accepted.point, keep).stability
         return Examined(accepted.point.omega, found.verdict, found.multiplier, found.multiplier_error, "")
 
-    monkeypatch.setattr(with_stability, "examine", examine)
+    monkeypatch.setattr(examining, "examine", examine)
     accepted: Any = SimpleNamespace(point=point)
     question: Any = SimpleNamespace(said=lambda text: text)
     straight = Looked(question, Journal())

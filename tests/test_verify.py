@@ -12,7 +12,7 @@ from small_v2 import changed, write_four_masses, write_shrouded_sector, write_tw
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.points import Response, collect
-from stickslip.analyses.forced_response.stability import in_time, with_stability
+from stickslip.analyses.forced_response.stability import examining, in_time
 from stickslip.analyses.forced_response.stability.in_time import STEPS, Check, check_in_time, chosen, refined
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
@@ -75,7 +75,7 @@ def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
         journal.put("finished", {"points": len(response.solved)})
         found = solve(journal, response.solved)
         # a model that cannot be integrated: the second time everything comes from the journal
-        monkeypatch.setattr(with_stability, "check_in_time", None)
+        monkeypatch.setattr(examining, "check_in_time", None)
         again = solve(journal, response.solved)
     assert list(again["verify_sentence"]) == list(found["verify_sentence"])
     # a linear motion: exact but for the start from few harmonics, tolerance of settling 1e-5

@@ -13,9 +13,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.pictures import of_first_case
-from stickslip.report.content import Table
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
 from stickslip.report.result import Node
+from stickslip.report.section import Table
 
 # endings of keys, longer ones first; True: the unit takes a prefix such as µ or M
 _UNITS = (

@@ -13,15 +13,14 @@ from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
 from stickslip.analyses.waves.page import waves
-from stickslip.analyses.waves.page.resonant import with_resonance
+from stickslip.analyses.waves.page.modes import with_resonance
 from stickslip.errors import input_error
 from stickslip.report.cases import cases_of
-from stickslip.report.content import Table, Words, chooser
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import Node, analysis, open_result, versions
-from stickslip.report.section import Block, Card, Content, Part, Section
+from stickslip.report.section import Block, Card, Content, Part, Section, Table, Words, chooser
 from stickslip.study.file.case_names import CASE
 from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.store.netcdf import alike, one_case

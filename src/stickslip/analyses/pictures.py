@@ -13,10 +13,10 @@ from stickslip.analyses.forced_response.page.at_peak.contacts import contact_lin
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Drawn, read
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, NONE, counted, fixed, joined, number, percent, quantity
 from stickslip.report.result import Node
+from stickslip.report.section import Table
 from stickslip.report.tiles import outlines, patches, triangulated
 
 _MANY_EDGES = 4_000  # edges of a panel, above which only sharp edges are drawn, to keep the page small

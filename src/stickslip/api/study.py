@@ -18,8 +18,7 @@ from stickslip.study.check import check_study
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import Outcome
-from stickslip.study.run import run_study
-from stickslip.study.shard import Shard
+from stickslip.study.run import Shard, run_study
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,7 @@ import pandas as pd
 import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
-from stickslip.study.coordinates import VARIED_KEY, as_stored
-from stickslip.study.varied import varied_values
+from stickslip.study.coordinates import VARIED_KEY, as_stored, varied_values
 
 
 def cells(frame: pd.DataFrame) -> list[list[str]]:

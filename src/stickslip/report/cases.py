@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.report.plot import ramp
-from stickslip.study.varied import assigned_of, families, first_varied_number, varied_values
+from stickslip.study.coordinates import assigned_of, families, first_varied_number, varied_values
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
 
 
 def families_of(data: xr.Dataset, key: str, cases: Sequence[ShownCase]) -> dict[str, list[ShownCase]]:
-    """Group some cases as `study.varied.families` does, each group by rising values; groups without a case are left out."""
+    """Group some cases as `study.coordinates.families` does, each group by rising values; groups without a case are left out."""
     own = {case.index: case for case in sorted(cases, key=lambda c: c.value)}
     groups = {name: [own[k] for k in own if k in members] for name, members in families(data, key).items()}
     return {name: group for name, group in groups.items() if group}

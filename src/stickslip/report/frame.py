@@ -16,9 +16,8 @@ from markupsafe import Markup, escape
 from plotly.io import to_html
 from plotly.offline import get_plotlyjs
 
-from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
-from stickslip.report.section import Card, Content
+from stickslip.report.section import Card, Chooser, Content, Table, Words
 from stickslip.study.file.case_names import CASE, shortened
 from stickslip.study.store.atomic_write import write_whole
 from stickslip.study.verdict import JOINT, Verdict, likewise, of_kinds, once, worst_first

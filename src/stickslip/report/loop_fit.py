@@ -8,11 +8,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.contact.loop_fit import LoopFit
-from stickslip.report.content import Words
 from stickslip.report.frame import Chapter, Placing, page_html, write_page
 from stickslip.report.plot import COLOURS, MUTED, Plot, legend_above, styled
 from stickslip.report.quantities import counted, number, scale_for
-from stickslip.report.section import Content
+from stickslip.report.section import Content, Words
 
 MOST_DRAWN = 20_000  # samples of a recording: more are thinned out
 

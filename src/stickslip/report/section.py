@@ -1,4 +1,7 @@
-"""The section of an analysis on the page: figures, tables and texts, each a function of its dataset."""
+"""The section of an analysis on the page: figures, tables, texts and buttons for the cases, each a function of its dataset.
+
+Content beside figures is plain text, which the templates escape.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,8 +9,84 @@ from typing import Any
 
 import xarray as xr
 
-from stickslip.report.content import Chooser, Table, Words
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import Plot
+
+# all texts may contain **bold** words, `names` as code, and line breaks
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table, which the page offers as CSV, too.
+
+    Parameters
+    ----------
+    head
+        Headings of the columns; empty for a list of facts.
+    rows
+        One cell a column in each row.
+    heading
+        Heading above the table; empty for none.
+    told
+        Paragraphs between the heading and the table.
+    numeric
+        Whether cells are set flush right from the second column.
+    worded
+        Whether the last column of a numeric table holds words.
+    items
+        Sentences listed below it.
+    folded
+        Line shown while the table is folded away; empty for an open table.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    heading: str = ""
+    told: Sequence[str] = ()
+    numeric: bool = True
+    worded: bool = False
+    items: Sequence[str] = ()
+    folded: str = ""
+
+
+@dataclass(frozen=True)
+class Words:
+    """Paragraphs and a list.
+
+    Parameters
+    ----------
+    told
+        Paragraphs.
+    heading
+        Heading above the paragraphs; empty for none.
+    items
+        Sentences listed below them.
+    folded
+        Line shown while all of it is folded away; empty for an open text.
+    preformatted
+        Lines below the list, shown as they are.
+    """
+
+    told: Sequence[str] = ()
+    heading: str = ""
+    items: Sequence[str] = ()
+    folded: str = ""
+    preformatted: str = ""
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Buttons that choose the case shown below them."""
+
+    heading: str
+    cases: tuple[ShownCase, ...]
+    chosen: int
+
+
+def chooser(heading: str, cases: tuple[ShownCase, ...], chosen: int) -> Chooser | None:
+    """Return buttons that choose a case; None for a single case."""
+    return Chooser(heading, cases, chosen) if len(cases) > 1 else None
+
 
 Content = Plot | Table | Words | Chooser
 Shown = Content | Sequence[Content] | None  # None if the dataset lacks the variables

@@ -1,4 +1,4 @@
-"""Coordinates of the dataset of an analysis: cases, varied keys, frequencies, speeds and outputs.
+"""Coordinates of the dataset of an analysis: cases, varied keys, frequencies, speeds and outputs; and the varied keys read back from it.
 
 They are made both when a run assembles its dataset and when a result is opened, so results of every version have them.
 """
@@ -13,12 +13,12 @@ import pandas as pd
 import xarray as xr
 from xarray.core.indexing import IndexSelResult
 
-from stickslip.arrays import BoolArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.column import names_of
 from stickslip.study.analysis import named
+from stickslip.study.file.case_names import JOINT, Naming, assignments, namings
 from stickslip.study.file.suffixes import unit_of
 from stickslip.study.questions import ANALYSES
-from stickslip.study.varied import as_number, varied_values
 
 CASE, POINT = "case", "point"  # the dimensions of cases, and of the points of all cases
 OWNER = "point_case"  # index of the case of each point if all cases share the dimension `point`
@@ -250,3 +250,86 @@ def _with_outputs(data: xr.Dataset) -> xr.Dataset:
     if dim in data.variables or not (rows == rows[:1]).all() or len(set(rows[0])) < len(rows[0]):
         return data
     return data.assign_coords({dim: rows[0].astype(str)})
+
+
+def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
+    """Return the varied keys and their values (case, key)."""
+    n = data.sizes.get("case", 1)
+    if "vary_value" not in data or not data["vary_value"].size:
+        return [], np.zeros((n, 0), dtype=object)
+    keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else [""]
+    return keys, np.asarray(data["vary_value"].transpose("case", "vary").values, dtype=object)
+
+
+def as_number(value: object) -> float:
+    """Return a varied value as a number; NaN for a text."""
+    try:
+        return float(str(value))
+    except ValueError:
+        return float("nan")
+
+
+def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
+    """Return the first varied key whose values are numbers, and its values (case,); an empty key and NaN if there is none."""
+    keys, values = varied_values(data)
+    numbers = np.array([[as_number(v) for v in row] for row in values]).reshape(values.shape)
+    for column, key in enumerate(keys):
+        found = numbers[:, column]
+        if np.isfinite(found).all() and len(set(found)) > 1:
+            return key, found
+    return "", np.full(len(values), np.nan)
+
+
+def naming_of(data: xr.Dataset, key: str) -> Naming:
+    """Return word, unit and power of ten of a varied key, as in names of cases."""
+    keys, values = varied_values(data)
+    if key not in keys:
+        return namings({key: []})[key]
+    return namings({k: [_as_given(v) for v in column] for k, column in zip(keys, values.T, strict=True)})[key]
+
+
+def _as_given(value: object) -> object:
+    number = as_number(value)
+    return str(value) if np.isnan(number) else number
+
+
+def families(data: xr.Dataset, key: str) -> dict[str, list[int]]:
+    """Group the cases that differ only in `key` and keys that vary with it: name of a group -> its cases in the order of the study.
+
+    The name consists of the parts of the cases' names that the group has in common; it is empty for a single group. A key varies with
+    `key` if each value of `key` determines its value, and its numbers rise or fall with `key`.
+    """
+    keys, values = varied_values(data)
+    along = values[:, keys.index(key)] if key in keys else np.zeros(len(values))
+    free = [k for k, name in enumerate(keys) if name != key and not _runs_with(along, values[:, k])]
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for case, row in enumerate(values[:, free]):
+        groups.setdefault(tuple(row), []).append(case)
+    spelled = [JOINT.join(assigned_of({keys[k]: v for k, v in zip(free, row, strict=True)})) for row in groups]
+    labels = [str(v) for v in data["case_label"].values] if "case_label" in data else []
+    shared = _shared_names(labels, list(groups.values()))
+    return dict(zip(shared if len(set(shared)) == len(groups) else spelled, groups.values(), strict=True))
+
+
+def _runs_with(along: np.ndarray, other: np.ndarray) -> bool:
+    pairs = set(zip(along, other, strict=True))
+    if len(pairs) > len(set(along)):
+        return False
+    numbers = np.array(sorted((as_number(a), as_number(b)) for a, b in pairs))
+    steps = np.diff(numbers[:, 1])
+    return bool(np.isnan(numbers).any() or (steps >= 0).all() or (steps <= 0).all())
+
+
+def _shared_names(labels: Sequence[str], groups: Sequence[Sequence[int]]) -> list[str]:
+    """Return for each group the parts of the names that all its cases have in common."""
+    if len(groups) == 1 or not labels:
+        return [""]
+    parts = [label.split(JOINT) for label in labels]
+    places = range(min(map(len, parts)))
+    own = [k for k in places if all(len({parts[c][k] for c in cases}) == 1 for cases in groups)]
+    return [JOINT.join(parts[cases[0]][k] for k in own) for cases in groups]
+
+
+def assigned_of(values: Mapping[str, object]) -> tuple[str, ...]:
+    """Return the varied keys of a case with their values as text: ``load.shaker.force_n = 3``."""
+    return assignments({k: _as_given(v) for k, v in values.items()})

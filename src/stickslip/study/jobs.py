@@ -17,7 +17,9 @@ from stickslip.errors import SingularError, StickslipError
 from stickslip.study.analysis import Analysis, Job
 from stickslip.study.outcome import CHECKED, UNSOLVED, checked
 from stickslip.study.own_code import Shipped
-from stickslip.study.store.attempts import (
+from stickslip.study.store.folder import token_file
+from stickslip.study.store.journal import (
+    JobJournal,
     begin,
     clear,
     file_at_work,
@@ -26,8 +28,6 @@ from stickslip.study.store.attempts import (
     reached,
     until_sealed_elsewhere,
 )
-from stickslip.study.store.folder import token_file
-from stickslip.study.store.journal import JobJournal
 from stickslip.study.store.progress import LOG, at_work, stage
 from stickslip.study.store.provenance import library_versions
 from stickslip.study.store.watch import ASIDE, UNKNOWN, Answer, Parcel, set_aside, solve_far, unknown, watched

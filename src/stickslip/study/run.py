@@ -1,6 +1,7 @@
-"""The runner: it executes the jobs of all analyses and writes each record to disk."""
+"""The runner: it executes the jobs of all analyses, or one of several shares of them, and writes each record to disk."""
 
 import json
+import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, closing, contextmanager
@@ -24,18 +25,70 @@ from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.own_code import CODE_FILE, OwnCode, Shipped
 from stickslip.study.questions import ANALYSES
-from stickslip.study.shard import Shard
 from stickslip.study.store.archive import PartStore
 from stickslip.study.store.atomic_write import whole_file, write_whole
-from stickslip.study.store.attempts import file_at_work, new_owner
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
-from stickslip.study.store.journal import SEALED, JobJournal, read_sealed
+from stickslip.study.store.journal import SEALED, JobJournal, file_at_work, new_owner, read_sealed
 from stickslip.study.store.netcdf import attributes_there, write_tree
 from stickslip.study.store.progress import LOG, Interrupted, stage, written_down
 from stickslip.study.store.provenance import Provenance, as_text, library_versions
 from stickslip.study.store.worker_process import Limits, check_memory_limit
 from stickslip.study.store.workers import Hands, check_kind, executor
 from stickslip.study.verdict import together
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of several runs that share the jobs of a study.
+
+    Parameters
+    ----------
+    number
+        Number of this shard, from 1.
+    count
+        Number of shards.
+    """
+
+    number: int
+    count: int
+
+    @classmethod
+    def read(cls, text: str) -> "Shard":
+        """Parse a text such as ``3/8``.
+
+        Raises
+        ------
+        InputError
+            If the text is not of this form.
+        """
+        found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
+        if not 1 <= shard.number <= shard.count:
+            raise input_error(
+                f"--shard {text}",
+                "is no share of the jobs",
+                "Give its number and how many there are: --shard 1/4 up to --shard 4/4.",
+            )
+        return shard
+
+    @property
+    def log(self) -> str:
+        """Name of its log file."""
+        return f"run-{self.number}-of-{self.count}.log"
+
+    def own(self, tasks: Sequence[Task]) -> Sequence[Task]:
+        """Return the tasks of this shard; every shard sorts all tasks in the same order."""
+        return tasks[self.number - 1 :: self.count]
+
+    def outcome(self, book: Book, done: int, left: int, folder: Path) -> Outcome:
+        """Return the outcome of a shard that ends while others still run."""
+        text = (
+            f"shard {self.number}/{self.count}: {done} jobs done, {left} of other shards are not. The last one to end puts the "
+            "result together, as does the same command without --shard."
+        )
+        LOG.info(text)
+        return Outcome(book.tree(complete=False), {}, 0, (folder / self.log,), text)
+
 
 SHARE = 0.1  # largest fraction of a run's time for writing incomplete results
 

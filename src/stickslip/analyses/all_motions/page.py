@@ -7,10 +7,9 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.all_motions.records import FoundMotions, SearchedFrequency
 from stickslip.analyses.columns import CaseView
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import MUTED, STABILITY_SYMBOLS, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table, Words
 
 _ORIGIN = {"sweep": "the sweep", "deflation": "found by deflation", "time": "found in time"}
 

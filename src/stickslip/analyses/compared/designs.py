@@ -19,7 +19,7 @@ from stickslip.model.readers.measured_columns import LENGTHS, read_columns
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import colour
 from stickslip.report.result import analysis
-from stickslip.study.varied import as_number, varied_values
+from stickslip.study.coordinates import as_number, varied_values
 
 NAME = "forced_response"
 _PER_NEWTON = {f"{unit}_per_n": factor for unit, factor in LENGTHS.items()}

@@ -21,10 +21,11 @@ from stickslip.analyses.forced_response.physics.limits import (
     NAMED_MODES,
     Physics,
     beforehand,
+    damper_lines,
     driven_line,
     physics_of,
+    statics_of_dampers,
 )
-from stickslip.analyses.forced_response.physics.statics import damper_lines, statics_of_dampers
 from stickslip.analyses.forced_response.problem import STILL_HZ, Question, question_of
 from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line

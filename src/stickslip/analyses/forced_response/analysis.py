@@ -40,7 +40,7 @@ from stickslip.analyses.forced_response.stability.bifurcating import (
     of_bifurcations,
 )
 from stickslip.analyses.forced_response.stability.elsewhere import motions_elsewhere
-from stickslip.analyses.forced_response.stability.examining import neighbours_of
+from stickslip.analyses.forced_response.stability.examining import integrated, neighbours_of, with_stability
 from stickslip.analyses.forced_response.stability.in_time import FLOPS, Check, chosen
 from stickslip.analyses.forced_response.stability.not_periodic import (
     in_time_instead,
@@ -49,7 +49,6 @@ from stickslip.analyses.forced_response.stability.not_periodic import (
 )
 from stickslip.analyses.forced_response.stability.stable import Examined, with_motion, without_raised
 from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
-from stickslip.analyses.forced_response.stability.with_stability import integrated, with_stability
 from stickslip.analyses.forced_response.summary import tables
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.cases import verdicts

@@ -9,10 +9,9 @@ from stickslip.analyses.columns import CaseView
 from stickslip.analyses.limit_cycle.records import Cycle, CycleBranch, LimitCycles
 from stickslip.analyses.limit_cycle.verdicts import grows
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, STABILITY_SYMBOLS, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table, Words
 from stickslip.units import HZ
 
 _READING = "The curve gives the damping ratio of the motion at each amplitude. Below zero the motion grows, above zero it decays. Where the curve crosses zero the motion is a limit cycle. Upward crossings attract motions of the same wave. Downward crossings repel them, and friction cannot bound the motion beyond."

@@ -7,10 +7,9 @@ from stickslip.analyses.columns import CaseView
 from stickslip.analyses.modal_synthesis.records import ModalSynthesis, SynthesisLevel
 from stickslip.analyses.modal_synthesis.verdicts import percent
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 from stickslip.units import HZ
 
 NAME = "modal_synthesis"

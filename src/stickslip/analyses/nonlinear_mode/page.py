@@ -10,11 +10,10 @@ from stickslip.analyses.forced_response.page.curves import abscissa
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.nonlinear_mode.records import ModeBranch, NonlinearModes
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table
 from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, joined, number, quantity, scale_for
 from stickslip.report.result import Node
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 
 NAME = "nonlinear_mode"
 _READING = "A free motion of each amplitude decays with this damping ratio, which includes all damping of the model. Below zero the motion grows. The curve includes the mean and all harmonics, and turns back at folds."

@@ -8,10 +8,9 @@ import plotly.graph_objects as go
 from stickslip.analyses.columns import CaseView
 from stickslip.analyses.quasi_periodic.records import QuasiPeriodic, TwoFrequencies
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 from stickslip.units import HZ
 
 SHOWN = 6  # motions drawn one by one

@@ -6,10 +6,9 @@ import plotly.graph_objects as go
 from stickslip.analyses.columns import CaseView
 from stickslip.analyses.residual_tractions.records import ConfirmedEnd, ResidualTractions
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table
 from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 
 _NAMES = ("own start", "smallest", "largest")
 _EQUAL = 1e-6  # relative difference of equal bounds

@@ -14,9 +14,8 @@ from stickslip.analyses.vibrating import represented
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
-from stickslip.response.resonances.envelope import heights, valley
 from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
-from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.point import PeakPoint, heights, valley
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, peak_curve, represented_as, smallest_peak
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
 from stickslip.study.store.progress import LOG, advance

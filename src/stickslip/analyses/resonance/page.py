@@ -8,10 +8,9 @@ import plotly.graph_objects as go
 from stickslip.analyses.columns import CaseView
 from stickslip.analyses.resonance.records import PeakCurve, Resonances
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table
 from stickslip.report.plot import INK, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 
 _BY = {
     "horizontal_tangent": "the largest amplitude of the output, where its response has a horizontal tangent",

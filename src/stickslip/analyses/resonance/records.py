@@ -8,8 +8,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.column import column, rows
-from stickslip.response.resonances.envelope import Overtaking, along_span, heights, overtakings
-from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.point import Overtaking, PeakPoint, along_span, heights, overtakings
 from stickslip.study.analysis import Solved
 from stickslip.units import DEG, HZ
 

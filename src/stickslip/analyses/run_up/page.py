@@ -9,10 +9,9 @@ from stickslip.analyses.columns import CaseView
 from stickslip.analyses.operation import Met, answered
 from stickslip.analyses.run_up.records import LinePoint, RunUp
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table
 from stickslip.report.plot import BROKEN, INK, MUTED, Plot, colour, shade, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 
 _LARGEST, _SMALLEST = 26.0, 3.0  # sizes of markers for the largest and for zero amplitude
 _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"]]

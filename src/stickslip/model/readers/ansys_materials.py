@@ -21,7 +21,6 @@ from stickslip.model.fe.material import (
 from stickslip.model.readers.ansys_blocks import ESYS, MATERIAL, NUMBER, Blocks, is_whole, read_blocks
 from stickslip.model.readers.units import Units, check_material
 
-ELASTIC_TABLES = ("ANEL", "ELAS")  # tables of 21 constants
 ENTRIES = [(i, j) for i in range(6) for j in range(i, 6)]  # their places: down the columns, order x, y, z, xy, yz, xz
 SHEARS = ("GXY", "GXZ", "GYZ")
 RATIOS = ("XY", "XZ", "YZ")

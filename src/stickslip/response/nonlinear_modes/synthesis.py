@@ -308,15 +308,6 @@ class PeakCurve:
     amplitude: FloatArray
     top: BoolArray
 
-    @property
-    def per_load(self) -> FloatArray:
-        """Peak over level, m.
-
-        For homogeneous contact laws this is also the curve over a damper's static load: with s times the static load
-        and the same vibration load, the peak is s times the peak of level 1/s.
-        """
-        return self.amplitude / self.level
-
 
 @by_one_thread
 def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:

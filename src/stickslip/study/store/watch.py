@@ -12,8 +12,7 @@ from typing import Any
 
 from stickslip.errors import StickslipError
 from stickslip.study.own_code import Shipped
-from stickslip.study.store.attempts import clear, file_at_work, new_owner, until_sealed_elsewhere
-from stickslip.study.store.journal import JobJournal
+from stickslip.study.store.journal import JobJournal, clear, file_at_work, new_owner, until_sealed_elsewhere
 from stickslip.study.store.progress import LOG, OF_RECORDS
 from stickslip.study.store.provenance import library_versions
 from stickslip.study.store.worker_process import Cell, Ended, Limits, OutOfTime, Stopped

@@ -9,9 +9,9 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import BifurcationRows, BifurcationSearch, SidePoints, read
 from stickslip.analyses.forced_response.summary import beside_bifurcations
 from stickslip.report.cases import ShownCase
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import MUTED, key_marker
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity
+from stickslip.report.section import Table, Words
 
 SYMBOLS = {
     "fold": "triangle-left",

@@ -7,12 +7,13 @@ import numpy as np
 from stickslip.analyses.forced_response.page.at_peak.bodies import bodies, energy
 from stickslip.analyses.forced_response.page.at_peak.contacts import (
     chosen_case,
+    friction_ratio_t,
+    friction_ratio_w,
     hysteresis_t,
     hysteresis_w,
     state_map,
     surface_map,
 )
-from stickslip.analyses.forced_response.page.at_peak.friction_ratio import friction_ratio_t, friction_ratio_w
 from stickslip.analyses.forced_response.page.at_peak.motion import in_motion
 from stickslip.analyses.forced_response.page.bifurcations import bifurcations
 from stickslip.analyses.forced_response.page.checks import (
@@ -24,8 +25,14 @@ from stickslip.analyses.forced_response.page.checks import (
     time_integration,
 )
 from stickslip.analyses.forced_response.page.curves import abscissa, frequency_response, low_order, of_each_order
-from stickslip.analyses.forced_response.page.errors import error_scatter, errors
-from stickslip.analyses.forced_response.page.harmonics import attempts, choice, kept_harmonics, more_harmonics
+from stickslip.analyses.forced_response.page.harmonics import (
+    attempts,
+    choice,
+    error_scatter,
+    errors,
+    kept_harmonics,
+    more_harmonics,
+)
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
 from stickslip.analyses.forced_response.page.optimisation import optimisation, what_is_needed, where_friction_works
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
@@ -41,7 +48,6 @@ from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.working_range import loss_at_peak
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, families_of, first_number
-from stickslip.report.content import Table
 from stickslip.report.quantities import (
     NONE,
     aligned,
@@ -53,8 +59,8 @@ from stickslip.report.quantities import (
     percent,
     quantity,
 )
-from stickslip.report.section import Block, Card, Section
-from stickslip.study.varied import naming_of
+from stickslip.report.section import Block, Card, Section, Table
+from stickslip.study.coordinates import naming_of
 from stickslip.study.verdict import LEVELS
 
 _ALIKE = 0.01  # largest difference of equal peaks, relative to the largest peak

@@ -7,7 +7,6 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import ExaminedRows, MotionsInTime, Shots, TimeChecks, read
 from stickslip.analyses.forced_response.stability.stable_words import FEW, all_lines
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import (
     NONE,
@@ -18,6 +17,7 @@ from stickslip.report.quantities import (
     quantity,
     scale_for,
 )
+from stickslip.report.section import Table, Words
 from stickslip.response.stability.found import modulus_text
 
 BY_MOTION = ", the motion in time being "  # part of the sentence on a point with undecided multipliers

@@ -9,9 +9,9 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import Jacobians, read
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
-from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import Plot, styled
 from stickslip.report.quantities import number, percent
+from stickslip.report.section import Chooser, chooser
 from stickslip.study.file.case_names import CASE
 
 _FAINT = 1e-3  # relative to the block of a stuck contact: smaller blocks are drawn white

@@ -12,8 +12,8 @@ from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, families_of, first_number
 from stickslip.report.plot import COLOURS, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, number, scale_for
+from stickslip.study.coordinates import as_number, naming_of, varied_values
 from stickslip.study.file.case_names import Naming, without_common_words
-from stickslip.study.varied import as_number, naming_of, varied_values
 
 FEW = 8  # largest number of cases in the legend of a panel
 MOST_PANELS = 12

@@ -14,11 +14,11 @@ from stickslip.analyses.forced_response.verdicts.working_range import MIN_PEAKS,
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.model.readers.measured_columns import same
 from stickslip.report.cases import ShownCase, families_of, first_number
-from stickslip.report.content import Words
 from stickslip.report.plot import GRID, INK, MUTED, Plot, log_ticks, ramp, styled
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
+from stickslip.report.section import Words
+from stickslip.study.coordinates import naming_of
 from stickslip.study.file.case_names import Naming
-from stickslip.study.varied import naming_of
 
 SURE = {"standard deviation": 2.0, "half-width": 1.0}  # error bars within which computed and measured peaks agree
 WITHIN = {"standard deviation": "two standard deviations", "half-width": "the half-width"}

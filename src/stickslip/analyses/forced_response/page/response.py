@@ -33,9 +33,9 @@ from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.report.cases import ShownCase, cases_of
-from stickslip.report.content import Table
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.result import Node
+from stickslip.report.section import Table
 from stickslip.solve.status import Status
 from stickslip.study.file.case_names import CASE
 from stickslip.study.verdict import LEVELS, said

@@ -12,8 +12,8 @@ from stickslip.analyses.forced_response.records.columns import CaseNumbers, Peak
 from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
+from stickslip.study.coordinates import families, first_varied_number, naming_of
 from stickslip.study.file.case_names import Naming
-from stickslip.study.varied import families, first_varied_number, naming_of
 from stickslip.study.verdict import LEVELS, said, together
 
 Regime = Literal["stuck", "stiffens", "works", "lets go"]

@@ -10,10 +10,9 @@ from stickslip.analyses.waves.page.waves import NEEDED, Waves, view_of
 from stickslip.analyses.waves.records import Campbell, contact_state, with_contacts
 from stickslip.analyses.waves.verdicts import in_ranges
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, MUTED, Plot, ring, shade, styled
 from stickslip.report.quantities import counted, number
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table, Words
 from stickslip.study.verdict import together
 
 _MOST_TOLD = 3  # crossings in the answer

@@ -6,10 +6,9 @@ import plotly.graph_objects as go
 from stickslip.analyses.waves.page.waves import Waves, view_of
 from stickslip.analyses.waves.records import Flutter, contact_state, hertz, with_contacts
 from stickslip.arrays import FloatArray
-from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import counted, number
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table, Words
 
 _NEEDED = ("wave_number", "phase_angle_deg", "damping_by_energy", "damping_by_eigenvalue", "damping")
 _PERCENT = 100.0

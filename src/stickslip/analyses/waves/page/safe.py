@@ -9,10 +9,9 @@ from stickslip.analyses.operation import answered
 from stickslip.analyses.waves.page.waves import NEEDED, Waves, diameter_axes, mode_lines, view_of
 from stickslip.analyses.waves.records import Interference, Pair, contact_state, hertz, with_contacts
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.content import Table
 from stickslip.report.plot import ALARM, GRID, INK, MUTED, Plot, ring, shade, styled
 from stickslip.report.quantities import NONE, counted, number, percent
-from stickslip.report.section import Block, Card, Section
+from stickslip.report.section import Block, Card, Section, Table
 
 _MOST_TOLD = 3  # near resonances in the answer
 _MOST_LABELS = 40  # engine orders written beside the zig-zag line

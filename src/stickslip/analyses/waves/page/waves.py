@@ -11,9 +11,9 @@ import xarray as xr
 
 from stickslip.analyses.columns import record_of
 from stickslip.analyses.waves.records import Campbell, Flutter, Interference, Modes, hertz, states_that_differ
-from stickslip.report.content import Words
 from stickslip.report.plot import colour
 from stickslip.report.result import Node
+from stickslip.report.section import Words
 
 NEEDED = ("wave_number", "nodal_diameter", "wave_kind", "frequency_hz")
 

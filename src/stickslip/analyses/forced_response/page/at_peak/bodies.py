@@ -10,9 +10,9 @@ from stickslip.analyses.forced_response.page.many_cases import FEW, extremes
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
-from stickslip.report.content import Words
 from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
+from stickslip.report.section import Words
 from stickslip.study.file.case_names import CASE
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
