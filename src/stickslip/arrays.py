@@ -1,4 +1,4 @@
-"""Array types used in signatures."""
+"""Array types used in signatures, and matrices as arrays."""
 
 from typing import Any
 
@@ -11,3 +11,8 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 TextArray = npt.NDArray[np.str_]
 Matrix = Any  # dense ndarray or scipy.sparse.csr_array, for which scipy has no types
+
+
+def as_array(matrix: Matrix) -> Matrix:
+    """Return a matrix (n, m), dense or sparse, as an ndarray."""
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)

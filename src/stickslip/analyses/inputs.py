@@ -16,6 +16,7 @@ from stickslip.analyses.pictures import of_first_case
 from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
 from stickslip.report.result import Node
 from stickslip.report.section import Table
+from stickslip.study.file.case_names import is_number
 
 # endings of keys, longer ones first; True: the unit takes a prefix such as µ or M
 _UNITS = (
@@ -116,7 +117,7 @@ def told(key: str, value: Any) -> str:
 
 def _numbers(value: Any) -> bool:
     each = value if isinstance(value, list) and value else [value]
-    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in each)
+    return all(map(is_number, each))
 
 
 def _plain(value: Any) -> str:

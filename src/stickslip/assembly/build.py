@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.fluid.aero_forces import Flow, about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
@@ -368,7 +368,7 @@ def _without(structure: Structure, dofs: IntArray) -> Structure:
     square = np.ix_(stays, stays)
 
     def rest(matrix: Matrix) -> Matrix:
-        return (matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)[square]
+        return as_array(matrix)[square]
 
     own = rest(structure.mass), rest(structure.damping), rest(structure.stiffness)
     return Structure(*own, structure.dofs.take(stays))

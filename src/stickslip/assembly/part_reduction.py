@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.assembly.locations import node_rows
 from stickslip.assembly.part_copies import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
@@ -347,7 +347,7 @@ def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
     """Return a reduced structure and its load of steady rotation as named arrays."""
     s = structure
     arrays = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "loss": s.loss}
-    own = {name: _dense(matrix) for name, matrix in arrays.items() if matrix is not None}
+    own = {name: as_array(matrix) for name, matrix in arrays.items() if matrix is not None}
     return own | {"steady": steady}
 
 
@@ -360,7 +360,3 @@ def unpacked(values: Mapping[str, Any], full: Structure, kept: IntArray) -> tupl
     dofs, sets = (with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size), surviving_sets(full, kept))
     own = mass, values["damping"], values["stiffness"]
     return Structure(*own, dofs, sets, None, loss), np.asarray(values["steady"])
-
-
-def _dense(matrix: Matrix) -> FloatArray:
-    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)

@@ -18,7 +18,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency, onto_interior
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import Harmonics, padded
-from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
+from stickslip.harmonic.matrices import SYMMETRY, asymmetry, is_diagonal, real_symmetric
 from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
 from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
@@ -302,7 +302,7 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
         back = to_modes[0], full[1].T[np.ix_(retained, interior)] @ modes, to_modes[2]
     damping = modes.T @ ll[1] @ modes
     loss = _loss(structure, retained, interior, modes)
-    diagonal = _is_diagonal(damping) and (loss is None or _is_diagonal(loss[2]))
+    diagonal = is_diagonal(damping, DIAGONAL_TOLERANCE) and (loss is None or is_diagonal(loss[2], DIAGONAL_TOLERANCE))
     own = _modal(modes, ll[2], np.diag(np.diagonal(damping)) if diagonal else damping)
     return CondensedStiffness(
         retained,
@@ -371,10 +371,3 @@ def _interior_modes(stiffness: FloatArray, mass: FloatArray) -> FloatArray:
         )
     with threads_for(len(mass)):
         return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
-
-
-def _is_diagonal(damping: FloatArray) -> bool:
-    """Whether the modes diagonalise the damping."""
-    size = np.max(np.abs(damping), initial=0.0)
-    off = np.max(np.abs(damping - np.diag(np.diagonal(damping))), initial=0.0)
-    return bool(off <= DIAGONAL_TOLERANCE * size)

@@ -1,9 +1,8 @@
 """Matrices of a structure as arrays, and checks of the properties that the condensation needs."""
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 
@@ -20,6 +19,13 @@ def asymmetry(matrix: Matrix) -> float:
     return float(abs(matrix - matrix.T).max()) / size if size else 0.0
 
 
+def is_diagonal(matrix: FloatArray | ComplexArray, tolerance: float) -> bool:
+    """Whether no entry off the diagonal is larger than `tolerance` times the largest entry of all."""
+    size = np.max(np.abs(matrix), initial=0.0)
+    off = np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
+    return bool(off <= tolerance * size)
+
+
 def is_real_symmetric(structure: Structure) -> bool:
     """Whether all matrices except the damping are real and symmetric, so that undamped modes decouple the interior."""
     matrices = (structure.mass, structure.stiffness, structure.loss)
@@ -29,7 +35,7 @@ def is_real_symmetric(structure: Structure) -> bool:
 def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
     """Return a matrix of a structure as an array, after checking its size and that it is finite."""
     matrix = getattr(structure, name)
-    dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    dense: FloatArray | ComplexArray = as_array(matrix)
     if not np.all(np.isfinite(dense)):
         raise input_error(f"Structure.{name}", "contains NaN or infinite entries", "Check the model that was read.")
     if asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):

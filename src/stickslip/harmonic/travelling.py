@@ -24,7 +24,7 @@ from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness, 
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import Harmonics, to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
-from stickslip.harmonic.matrices import SYMMETRY, checked_matrix, is_real_symmetric
+from stickslip.harmonic.matrices import SYMMETRY, checked_matrix, is_diagonal, is_real_symmetric
 from stickslip.harmonic.mistuned import by_sectors, condense_mistuned
 from stickslip.harmonic.sparse_stiffness import LEAST_SPARSE, Unreduced, keep_all
 from stickslip.harmonic.spectral import PARALLEL, Blocks
@@ -271,7 +271,7 @@ def _in_modes(matrices: Four, near: IntArray, far: IntArray) -> ModalWave | None
         return None
     to_modes = [nl @ modes for _, nl, _, _ in blocks]
     own = [modes.conj().T @ ll @ modes for _, _, _, ll in blocks[1:]]
-    if not (_diagonal(own[0]) and _diagonal(own[2])):
+    if not (is_diagonal(own[0], DIAGONAL) and is_diagonal(own[2], DIAGONAL)):
         return None
     damping, mass, loss = (np.diagonal(matrix).real for matrix in own)
     static = to_modes[0]
@@ -312,12 +312,6 @@ def _matrix(structure: Structure, name: str, mean: bool) -> Array:
 def _hermitian(matrix: Array) -> bool:
     size = np.max(np.abs(matrix), initial=0.0)
     return bool(np.max(np.abs(matrix - matrix.conj().T), initial=0.0) <= SYMMETRY * size)
-
-
-def _diagonal(matrix: Array) -> bool:
-    size = np.max(np.abs(matrix), initial=0.0)
-    off = np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
-    return bool(off <= DIAGONAL * size)
 
 
 def _blocks(matrix: Array, near: IntArray, far: IntArray) -> Four:

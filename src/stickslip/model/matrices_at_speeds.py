@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy
 
-from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import check_choice, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.structure import Structure
@@ -176,7 +176,7 @@ class SpeedMatrices:
         """Entries of the stiffness over Ω²."""
         every = [s.structure.stiffness for s in self.states]
         if self._places is None:
-            known = np.array([_dense(k).ravel() for k in every])
+            known = np.array([as_array(k).ravel() for k in every])
         else:
             known = np.zeros((len(every), self._places.size))
             for row, k in zip(known, every, strict=True):
@@ -441,10 +441,6 @@ def _translations(structure: Structure) -> FloatArray | None:
 def _positions(matrix: Matrix) -> IntArray:
     found = scipy.sparse.coo_array(matrix)
     return np.asarray(found.row.astype(np.int64) * found.shape[1] + found.col)
-
-
-def _dense(matrix: Matrix) -> FloatArray:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def _norm(matrix: Matrix) -> float:

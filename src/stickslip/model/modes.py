@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import InputError, SingularError, input_error
 from stickslip.model.fe.factorisation import DENSE, Factorisation, Say, Solve, factorise, negative_eigenvalues, silent
 from stickslip.model.fe.lanczos import lanczos
@@ -242,7 +242,7 @@ def lowest_modes(
         If fewer than `n` motions have mass.
     """
     if solve is None or _small(stiffness, n):
-        K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))
+        K, M = (as_array(m) for m in (stiffness, mass))
         return dense_modes(K, M, n, shift, dofs)
     kind = complex if np.iscomplexobj(stiffness) or np.iscomplexobj(mass) else float
     values, vectors = lanczos(mass, n, solve, shift, kind)
@@ -286,7 +286,7 @@ def refuse_bad_mass(structure: Structure, place: str) -> None:
         )
     if structure.n > DENSE:
         return
-    dense = structure.mass.toarray() if scipy.sparse.issparse(structure.mass) else structure.mass
+    dense = as_array(structure.mass)
     squares, shapes = np.linalg.eigh(dense)
     if squares[0] < -INDEFINITE * squares[-1]:
         most = structure.dofs.labels[int(np.argmax(np.abs(shapes[:, 0])))]
@@ -381,7 +381,7 @@ def dense_modes(
 
 def mass_rank(mass: Matrix) -> int:
     """Return the rank of a (size, size) mass matrix, dense or sparse."""
-    dense = mass.toarray() if scipy.sparse.issparse(mass) else mass
+    dense = as_array(mass)
     return len(dense) if _definite(dense) else _by_mass(dense, None)[0].size
 
 

@@ -11,9 +11,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 from stickslip.units import HZ, RPM
@@ -358,7 +357,7 @@ class Feedback:
                 "Reduce the sector first: give it a table [reduction].",
             )
         stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
-        K, C = (_dense(m) for m in (structure.stiffness, structure.damping))
+        K, C = (as_array(m) for m in (structure.stiffness, structure.damping))
         return replace(structure, stiffness=K - self._outer(stiff), damping=C - self._outer(damp))
 
     def force(self, omega: complex) -> ComplexArray:
@@ -381,10 +380,6 @@ class Feedback:
         product = self.patterns @ inner @ self.patterns.conj().T
         standing = abs(np.sin(self.phase_angle)) < 1e-12 and np.isrealobj(self.patterns)
         return np.asarray(product.real if standing else product)
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def _summed(values: Matrix, phases: ComplexArray) -> ComplexArray:

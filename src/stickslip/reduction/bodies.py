@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import SingularError
 from stickslip.model.fe.factorisation import Say, Solve, factorise
 from stickslip.model.modes import SHIFT, connected_parts, lowest_modes, submatrix
@@ -173,7 +172,7 @@ def fill_constraint_modes(
         for first in range(0, keep.size, BLOCK):
             some = np.arange(first, min(first + BLOCK, keep.size))
             block = load[:, some]
-            block = block.toarray() if scipy.sparse.issparse(block) else block
+            block = as_array(block)
             touched = some[np.any(block != 0, axis=0)]
             if touched.size:
                 columns[np.ix_(body.dofs, touched)] = -body.solve(block[:, touched - first])

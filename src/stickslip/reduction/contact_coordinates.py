@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.structure import Dofs, Structure, join_dofs
 from stickslip.reduction.basis import in_coordinates, surviving_sets
@@ -171,7 +171,7 @@ def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
         raise input_error("TunedWheel", "has forces of constraints among its motions", "Put them behind these.")
     own = n - 2 * ties
     held = structure.stiffness[n - ties :]
-    dense = held.toarray() if scipy.sparse.issparse(held) else np.asarray(held)
+    dense = as_array(held)
     copies = -np.linalg.solve(dense[:, own : own + ties], dense[:, :own])
     return np.vstack([np.eye(own), copies, np.zeros((ties, own))])
 
@@ -241,7 +241,7 @@ def in_relative_coordinates(
 
 
 def _dense(matrix: Matrix) -> Matrix:
-    full = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    full = as_array(matrix)
     return full if np.iscomplexobj(full) else full.astype(float)
 
 

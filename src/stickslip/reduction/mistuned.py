@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.model.structure import Dofs, Structure
 
 ROUNDING = 1e-12  # imaginary part over the largest entry: less is rounding, and the matrix is real
@@ -30,7 +30,7 @@ def couplings(waves: Sequence[Matrix]) -> Matrix:
     numpy.ndarray
         (n_s, a, b), entry d for the sector d places behind; real if opposite waves are conjugates.
     """
-    dense = np.array([w.toarray() if scipy.sparse.issparse(w) else w for w in waves])
+    dense = np.array([as_array(w) for w in waves])
     found = np.fft.ifft(dense, axis=0)
     real = np.abs(found.imag).max(initial=0.0) <= ROUNDING * np.abs(found.real).max(initial=0.0)
     return np.ascontiguousarray(found.real) if real else found
@@ -211,8 +211,8 @@ def mistuned_wheel(waves: list[Structure], shares: list[Matrix], factors: FloatA
     """
     size = (len(waves), waves[0].n, waves[0].n)
     lossy = waves[0].loss is not None
-    k, c, m = (np.array([_dense(getattr(w, kind)) for w in waves]) for kind in KINDS[:3])
-    loss = np.array([_dense(w.loss) for w in waves]) if lossy else np.zeros(size)
+    k, c, m = (np.array([as_array(getattr(w, kind)) for w in waves]) for kind in KINDS[:3])
+    loss = np.array([as_array(w.loss) for w in waves]) if lossy else np.zeros(size)
     motion = circulant(couplings(shares))
     stiffness = circulant(couplings(list(k))) + motion.T @ (factors.reshape(-1, 1) * motion)
     structure = Structure(
@@ -223,7 +223,3 @@ def mistuned_wheel(waves: list[Structure], shares: list[Matrix], factors: FloatA
         loss=circulant(couplings(list(loss))) if lossy else None,
     )
     return MistunedWheel(structure, (k, c, m, loss), np.array(shares), factors)
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)

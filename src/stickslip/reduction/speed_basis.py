@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.model.structure import Structure, modal_dofs
 from stickslip.reduction.basis import in_coordinates, surviving_sets, with_modal_dofs
@@ -163,7 +163,7 @@ def on_modes_of_others(
 def _basis(structure: Structure, keep: IntArray, reduction: Reduction) -> tuple[Structure, Matrix]:
     small = reduction.of(replace(structure, basis=None), keep)
     basis: Matrix = small.basis
-    return small, basis.toarray() if scipy.sparse.issparse(basis) else np.asarray(basis)
+    return small, as_array(basis)
 
 
 def _in_mass(one: Matrix, mass: Matrix, other: Matrix) -> Matrix:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from stickslip.arrays import BoolArray, FloatArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import Say, factorise, negative_eigenvalues, silent
 from stickslip.model.modes import normal_modes
@@ -286,7 +286,7 @@ def _basis_between(structure: Structure, reduced: Structure) -> Matrix:
         gram = scipy.sparse.csr_array(diagonal @ gram @ diagonal)
     else:
         gram = scale[:, None] * gram * scale
-    right = right.toarray() if scipy.sparse.issparse(right) else right
+    right = as_array(right)
     inner = scale[:, None] * factorise(gram)(scale[:, None] * right)
     if np.linalg.norm(before @ inner - after) > 1e-6 * np.linalg.norm(after):
         raise input_error(

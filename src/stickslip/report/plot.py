@@ -1,9 +1,11 @@
 """Figures of a section, and their common style."""
 
+import base64
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 import plotly.graph_objects as go
 from markupsafe import Markup
 
@@ -169,3 +171,8 @@ def key_marker(name: str, symbol: str, group: str, group_title: str = "") -> go.
     title = {"text": group_title} if group_title else None
     shared = {"x": [None], "y": [None], "mode": "markers", "legendgroup": group}
     return go.Scatter(name=name, marker=mark, legendgrouptitle=title, **shared)
+
+
+def as_base64(values: npt.NDArray[np.generic]) -> str:
+    """Return the bytes of an array, row by row, as the text that the page's scripts read."""
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

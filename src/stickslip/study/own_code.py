@@ -18,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 from stickslip.errors import InputError, StickslipError, did_you_mean, input_error
+from stickslip.study.questions import loaded
 
 ADDRESS = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 ALLOW = "If you trust it, add --allow-code to the command (in Python: Study.from_file(path, allow_code=True))."
@@ -128,12 +129,6 @@ def is_address(given: object) -> bool:
     return isinstance(given, str) and ":" in given
 
 
-def of_address(address: str) -> Any:
-    """Return the object at an address that `OwnCode.at` has already accepted."""
-    module, _, name = address.partition(":")
-    return getattr(import_module(module), name)
-
-
 def state_of(address: str) -> str:
     """Return a text that changes with the module's files, for an address that `OwnCode.at` has already accepted."""
     module = address.partition(":")[0]
@@ -153,7 +148,7 @@ def called(address: str, place: str, *given: Any, **named: Any) -> Any:
     InputError
         If the function raises an exception: its own `InputError`, or else an error at `place` with the line of the exception.
     """
-    function = of_address(address)
+    function = loaded(address)
     try:
         return function(*given, **named)
     except InputError:

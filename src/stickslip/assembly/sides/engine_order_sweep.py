@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, Matrix
+from stickslip.arrays import FloatArray, as_array
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.build import assemble_tuned
 from stickslip.assembly.model import Model
@@ -185,10 +185,10 @@ def _difference(line: SpeedLine, speed: float, true: Assembled) -> float:
 def _of_structures(mine: Structure, theirs: Structure, omega: float) -> float:
     """Return the largest difference of ``K + iωC - ω²M``, relative to the energy ``K + ω²M``, over all motions."""
     change = [
-        _dense(a) - _dense(b)
+        as_array(a) - as_array(b)
         for a, b in ((mine.stiffness, theirs.stiffness), (mine.damping, theirs.damping), (mine.mass, theirs.mass))
     ]
-    size = _dense(theirs.stiffness) + omega**2 * _dense(theirs.mass)
+    size = as_array(theirs.stiffness) + omega**2 * as_array(theirs.mass)
     factors = 1.0, omega, omega**2
     diagonal = np.abs(np.diagonal(size))
     scale = np.sqrt(np.maximum(diagonal, 1e-9 * diagonal.max()))
@@ -199,7 +199,3 @@ def _of_structures(mine: Structure, theirs: Structure, omega: float) -> float:
     good = values > 1e-12 * values.max()
     inverse = vectors[:, good] / np.sqrt(values[good])
     return float(max(scipy.linalg.norm(inverse.conj().T @ m @ inverse, 2) for m in matrices))
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)

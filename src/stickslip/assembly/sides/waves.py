@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.assembly.fluid.aero_forces import Flow
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.joints.ties import Coordinates
@@ -256,16 +256,12 @@ def _parted(
     for k, (own, columns) in waves.items():
         first = columns.shape[1] - felt - spread
         rest[k] = own, columns[:, 0] if alone else columns[:, :first]
-        behind = _dense(columns[:, first:])
+        behind = as_array(columns[:, first:])
         if flow is not None:
             forces[k] = flow.on(k, behind[:, :felt])
         real, imaginary = np.hsplit(behind[:, felt:], 2)
         fields[k] = real + 1j * imaginary
     return rest, forces, fields
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def _content_of(model: Model, like: Sequence[Spin], wheel: Sequence[Any], kept: IntArray) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.assembly.contact import ALONE, NEXT, SPATIAL, Join
 from stickslip.assembly.joints.cyclic_faces import unlike_faces
 from stickslip.assembly.joints.pairs import Pairs, Turn
@@ -50,7 +50,7 @@ class DampingOfParts:
             If parts are connected by more than contacts.
         """
         owner = np.array(moving.dofs.part)
-        damping = _dense(moving.damping).astype(complex if moving.is_complex else float)
+        damping = as_array(moving.damping).astype(complex if moving.is_complex else float)
         for name, own in self.parts:
             if own is None:
                 continue
@@ -58,9 +58,9 @@ class DampingOfParts:
             others = np.flatnonzero(owner != name)
             _refuse_joined(name, moving, np.ix_(rows, others))
             square = np.ix_(rows, rows)
-            mass, skew, stiffness = (_dense(m)[square] for m in (moving.mass, moving.damping, moving.stiffness))
+            mass, skew, stiffness = (as_array(m)[square] for m in (moving.mass, moving.damping, moving.stiffness))
             alone = Structure(mass, skew, stiffness, moving.dofs.take(rows))
-            damping[square] = _dense(own.of_modes(alone).damping)
+            damping[square] = as_array(own.of_modes(alone).damping)
         sparse = scipy.sparse.issparse(moving.stiffness)
         return replace(moving, damping=scipy.sparse.csr_array(damping) if sparse else damping)
 
@@ -343,7 +343,7 @@ def reduced_wave(
     """
     moving = _with_way_back(sector, kept, k, how, others)
     load = moving.project(steady)
-    return moving, load.toarray() if scipy.sparse.issparse(load) else load
+    return moving, as_array(load)
 
 
 def modes_of_wave(sector: CyclicSector, kept: IntArray, k: int, reduction: Reduction) -> Matrix:
@@ -447,17 +447,13 @@ def wheel_of(
 
 def _refuse_joined(name: str, moving: Structure, across: tuple[Matrix, ...]) -> None:
     for matrix in (moving.mass, moving.stiffness):
-        dense = _dense(matrix)
+        dense = as_array(matrix)
         if np.abs(dense[across]).max(initial=0.0) > JOINED * np.abs(dense).max(initial=0.0):
             raise input_error(
                 f"part.{name}.damping",
                 "differs from the value of a part joined to it, and both have their modes together",
                 "Give them the same damping by modes, or another form.",
             )
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def is_staged(joins: Mapping[str, Join]) -> bool:

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 import scipy
 
-from stickslip.arrays import Matrix
+from stickslip.arrays import Matrix, as_array
 from stickslip.errors import SingularError, StickslipError, input_error, missing_package
 from stickslip.model.fe.multifrontal import multifrontal
 
@@ -91,7 +91,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
     """
     chosen = _chosen(matrix, backend)
     if chosen == "dense":
-        found = _dense(matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix))
+        found = _dense(as_array(matrix))
     else:
         say(f"factorising {matrix.shape[0]} equations ({chosen})")
         found = _sparse(matrix, chosen, say, free=backend == "auto")
@@ -185,7 +185,7 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
     if chosen == "multifrontal":
         chosen = _indefinite()
     if chosen == "dense":
-        whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+        whole = as_array(matrix)
         whole = (whole + whole.conj().T) / 2  # makes the diagonal exactly real
         blocks = scipy.linalg.ldl(whole, hermitian=True)[1]  # diagonal blocks of one or two rows
         beside = np.abs(np.diag(blocks, -1))

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix, as_array
 from stickslip.errors import InputError, StickslipError, input_error
 from stickslip.model.fe.factorisation import DENSE, Say, silent
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -78,7 +77,7 @@ def _most_negative(matrix: Matrix) -> tuple[int, float] | None:
         dof = int(np.argmin(diagonal))
         negative = diagonal[dof] < -ROUNDED * np.abs(diagonal).max()
         return (dof, float(diagonal[dof])) if negative else None
-    values, shapes = np.linalg.eigh(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    values, shapes = np.linalg.eigh(as_array(matrix))
     if values[0] >= -ROUNDED * max(abs(values[-1]), abs(values[0])) or values[0] == 0:
         return None
     return int(np.argmax(np.abs(shapes[:, 0]))), float(values[0])

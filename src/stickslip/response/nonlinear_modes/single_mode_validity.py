@@ -19,9 +19,8 @@ effect. `along` returns where one mode dominates.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
@@ -174,7 +173,7 @@ def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
     here = own.at(found.place)
     motion = own.displacement(found.place)[0]
     system = own.backbone.system
-    gaps = _dense(system.interface.gap_operator)
+    gaps = as_array(system.interface.gap_operator)
     rows = np.vstack([np.eye(1, system.structure.n, dof), gaps])
     beside = others.answer(found.omega, left_over(own, found), rows)[0]
     moves = rows @ motion[1]
@@ -264,12 +263,8 @@ def _basis(free: Structure, force: ComplexArray) -> Matrix:
 
 
 def _hermitian(matrix: Matrix) -> Matrix:
-    dense = _dense(matrix)
+    dense = as_array(matrix)
     return 0.5 * (dense + dense.conj().T)
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 @dataclass(frozen=True, eq=False)

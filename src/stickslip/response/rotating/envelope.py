@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, as_array
 from stickslip.contact.compiled import Evaluator
 from stickslip.contact.interface import add_contact_jacobian
 from stickslip.errors import input_error
@@ -217,13 +216,13 @@ class _Flow:
         rate, parts = self.sweep.signed_rate, []
         for h in range(self.balance.order + 1):
             structure = side.of_harmonic(h)
-            stiffness = _dense(structure.stiffness)
+            stiffness = as_array(structure.stiffness)
             if h == 0:
                 parts.append(_Condensed.one(stiffness.real + 0j, force[0], self.balance.linear.retained))
                 continue
-            mass, damping = _dense(structure.mass), _dense(structure.damping)
+            mass, damping = as_array(structure.mass), as_array(structure.damping)
             if structure.loss is not None:
-                stiffness = stiffness + 1j * _dense(structure.loss)
+                stiffness = stiffness + 1j * as_array(structure.loss)
             s = 1j * h * omega
             slow = 2 * s * mass + damping
             matrix = stiffness + s * damping + s**2 * mass + 1j * h * rate * mass + now * slow
@@ -324,7 +323,3 @@ def _ahead(points: list[_Step], step: float) -> ComplexArray:
         others = [(time - o.time) / (one.time - o.time) for o in points if o is not one]
         found += np.prod(others) * one.q
     return found
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)

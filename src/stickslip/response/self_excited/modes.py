@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix, as_array
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.blas_threads import by_one_thread
 from stickslip.model.modes import gyroscopic_modes, normal_modes, with_springs
@@ -208,5 +207,5 @@ def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Mat
 
 
 def _hermitian(matrix: Matrix) -> Matrix:
-    dense: FloatArray | ComplexArray = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    dense: FloatArray | ComplexArray = as_array(matrix)
     return 0.5 * (dense + dense.conj().T)

@@ -13,9 +13,8 @@ from functools import lru_cache
 from math import gcd
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, Matrix, as_array
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -132,7 +131,7 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
         loads[h] = _travelling(wheel, h, amplitude[:own], sectors)
     waves = [_wave(wheel, common * k) for k in range(sectors)]
     weights = None if interface.weights is None else np.tile(interface.weights, sectors)
-    gaps = _circulant([_dense(interface.gap_operator) @ own_motions(w, wheel.multipliers) for w in waves])
+    gaps = _circulant([as_array(interface.gap_operator) @ own_motions(w, wheel.multipliers) for w in waves])
     turns = sectors > 1 and alike == (sectors, common)
     motion = WaveMotion(1, 0)
     if turns:
@@ -140,11 +139,11 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
         motion = WaveMotion(sectors, step)
     static = np.tile(load.static[:own], sectors)
     structure = Structure(
-        _circulant([_dense(w.mass)[:own, :own] for w in waves]),
-        _circulant([_dense(w.damping)[:own, :own] for w in waves]),
-        _circulant([_dense(w.stiffness)[:own, :own] for w in waves]),
+        _circulant([as_array(w.mass)[:own, :own] for w in waves]),
+        _circulant([as_array(w.damping)[:own, :own] for w in waves]),
+        _circulant([as_array(w.stiffness)[:own, :own] for w in waves]),
         _dofs(wheel.dofs.take(np.arange(own)), sectors),
-        loss=None if waves[0].loss is None else _circulant([_dense(w.loss)[:own, :own] for w in waves]),
+        loss=None if waves[0].loss is None else _circulant([as_array(w.loss)[:own, :own] for w in waves]),
     )
     names = tuple(f"sector{s}.{name}" for s in range(sectors) for name in interface.names)
     contacts = Interface(names, interface.laws * sectors, gaps, weights)
@@ -269,27 +268,23 @@ def _agrees(wheel: TunedWheel, harmonic: int) -> bool:
     chosen = _chosen(wheel.waves, k, wheel)
     if chosen == k:
         return True
-    own, other = (_dense(wheel.waves[number].stiffness) for number in (k, chosen))
+    own, other = (as_array(wheel.waves[number].stiffness) for number in (k, chosen))
     return bool(np.allclose(own, np.conj(other), rtol=0, atol=REAL * np.abs(own).max()))
 
 
 def _conjugate(own: Structure) -> Structure:
-    mass, damping, stiffness = (np.conj(_dense(m)) for m in (own.mass, own.damping, own.stiffness))
-    loss = None if own.loss is None else np.conj(_dense(own.loss))
+    mass, damping, stiffness = (np.conj(as_array(m)) for m in (own.mass, own.damping, own.stiffness))
+    loss = None if own.loss is None else np.conj(as_array(own.loss))
     return Structure(mass, damping, stiffness, own.dofs, loss=loss)
 
 
 def _circulant(waves: list[Matrix]) -> FloatArray:
     """Return the (n p, n q) matrix of n sectors from the (p, q) matrices of their waves."""
-    parts = np.fft.ifft(np.array([_dense(w) for w in waves]), axis=0)
+    parts = np.fft.ifft(np.array([as_array(w) for w in waves]), axis=0)
     if np.abs(parts.imag).max(initial=0.0) > REAL * np.abs(parts).max(initial=0.0):
         raise input_error("all_sectors", "the waves are those of no real matrices", "Give waves of a real sector.")
     n = len(parts)
     return np.block([[parts[(row - column) % n].real for column in range(n)] for row in range(n)])
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def _dofs(own: Dofs, sectors: int) -> Dofs:

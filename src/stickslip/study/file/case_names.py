@@ -60,7 +60,7 @@ class Naming:
         """Return a value of the key, or a list of them, in `unit`: ``0.01`` -> ``10.0`` for ``g``; texts stay."""
         if isinstance(value, list):
             return [self.shown(v) for v in value]
-        if not self.tens or not _is_number(value):
+        if not self.tens or not is_number(value):
             return value
         return float(Decimal(repr(float(value))).scaleb(self.tens))
 
@@ -106,7 +106,7 @@ def namings(columns: Mapping[str, Sequence[Any]]) -> dict[str, Naming]:
 def _naming(word: str, unit: str, values: Sequence[Any]) -> Naming:
     own = Naming(word, unit, _digits(values))
     entries = [entry for value in values for entry in (value if isinstance(value, list) else [value])]
-    if not all(map(_is_number, entries)):
+    if not all(map(is_number, entries)):
         return own
     choices = [own, *(Naming(word, name, own.digits, tens) for name, tens in PREFIXED.get(unit, {}).items())]
     every = _told_apart(values, own.digits)
@@ -123,7 +123,8 @@ def _unreadable(naming: Naming, numbers: Sequence[float]) -> int:
     return sum(not LEAST_SHOWN <= abs(naming.shown(v)) < MOST_SHOWN for v in numbers if v)
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a value of a study file is a number; true and false are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

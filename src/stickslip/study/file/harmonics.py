@@ -12,7 +12,8 @@ from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
 from stickslip.study.file.section import Positive, Section, custom_error, own_object, refuse_all, shown
-from stickslip.study.own_code import is_address, made, of_address
+from stickslip.study.own_code import is_address, made
+from stickslip.study.questions import loaded
 
 HIGHEST = 200  # highest harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
@@ -143,7 +144,7 @@ class Harmonics(Section):
     def own_strategy(self) -> Any:
         """The user's strategy; None for a built-in one."""
         if is_address(self.selection):
-            return made(of_address(self.selection), self.selection)
+            return made(loaded(self.selection), self.selection)
         return None if isinstance(self.selection, str) else self.selection
 
     @property

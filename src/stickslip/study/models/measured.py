@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from stickslip.arrays import FloatArray
 from stickslip.errors import did_you_mean, input_error, missing_file
 from stickslip.model.readers.measured_columns import LENGTHS, MeasuredColumns, read_columns
-from stickslip.study.file.case_names import assignments, written
+from stickslip.study.file.case_names import assignments, is_number, written
 from stickslip.study.file.study import StudyFile, TablesOfCase
 from stickslip.study.file.tables import study_tables
 from stickslip.study.file.vary import with_values
@@ -139,17 +139,13 @@ def _varied_number(file: StudyFile) -> str:
         )
     for key in file.cases[0].values:
         given = [case.values[key] for case in file.cases]
-        if all(_is_number(v) for v in given) and len(set(given)) > 1:
+        if all(is_number(v) for v in given) and len(set(given)) > 1:
             return key
     raise input_error(
         place,
         "has nothing to be drawn over: [vary] varies no number",
         "Vary what was varied in the test, for example load.shaker.ratio = [100, 20].",
     )
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _check_names(columns: MeasuredColumns, key: str, others: Sequence[str]) -> None:

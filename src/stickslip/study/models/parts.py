@@ -34,7 +34,8 @@ from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
 from stickslip.study.models.temperature import doubts_of_temperature, temperature_of
-from stickslip.study.own_code import is_address, made, of_address, state_of
+from stickslip.study.own_code import is_address, made, state_of
+from stickslip.study.questions import loaded
 from stickslip.units import DEG
 
 LOG = logging.getLogger("stickslip")
@@ -240,7 +241,7 @@ _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
 
 
 def _own_reduction(address: str) -> OwnReduction:
-    return OwnReduction(made(of_address(address), address), state_of(address))
+    return OwnReduction(made(loaded(address), address), state_of(address))
 
 
 def place_in_steps(steps: Sequence[Placed]) -> Place:

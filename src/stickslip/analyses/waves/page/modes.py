@@ -4,13 +4,11 @@ The figure opens on the mode that an engine order excites nearest to the speed. 
 coarse skin, whose points belong to the fine one. The script ``assets/shapes.js`` expands them to the wheel.
 """
 
-import base64
 import json
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import plotly.graph_objects as go
 import xarray as xr
 from markupsafe import Markup, escape
@@ -31,7 +29,7 @@ from stickslip.analyses.waves.records import (
 )
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.model.mesh.solid_mesh import coarse_skin
-from stickslip.report.plot import FONT, INK, MUTED, Plot, colour, legend_above, ring, styled
+from stickslip.report.plot import FONT, INK, MUTED, Plot, as_base64, colour, legend_above, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section, Table, Words
 from stickslip.study.store.netcdf import one_case, variable
@@ -170,17 +168,17 @@ def _payload(view: Waves[Modes], points: FloatArray, shape: FloatArray, faces: I
         "sectors": view.sectors,
         "axis": _unit(np.zeros(0) if found.axis_direction is None else found.axis_direction).tolist(),
         "origin": origin.tolist(),
-        "points": _text(points.astype("<f4")),
-        "faces": _text(faces.astype("<i4")),
-        "wheelPoints": _text(wheel.astype("<i4")),
-        "wheelFaces": _text(wheel_faces.astype("<i4")),
+        "points": as_base64(points.astype("<f4")),
+        "faces": as_base64(faces.astype("<i4")),
+        "wheelPoints": as_base64(wheel.astype("<i4")),
+        "wheelFaces": as_base64(wheel_faces.astype("<i4")),
         "waveNumbers": [w.wave_number for w in found.waves],
         "waves": [
             f"{name}, {w.kind} wave" if view.sectors > 1 else name
             for name, w in zip(view.waves, found.waves, strict=True)
         ],
         "hertz": [[f"{f:.6g}" for f in row[:modes]] for row in hertz(found)],
-        "shapes": [[_text(s) for s in row] for row in whole],
+        "shapes": [[as_base64(s) for s in row] for row in whole],
     }
 
 
@@ -193,10 +191,6 @@ def _outside_of_wheel(view: Waves[Modes], faces: IntArray) -> IntArray:
 def _unit(direction: FloatArray) -> FloatArray:
     length = float(np.linalg.norm(direction))
     return direction / length if direction.size == 3 and length > 0 else np.array([0.0, 0.0, 1.0])
-
-
-def _text(values: npt.NDArray[np.generic]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
 def _controls(view: Waves[Modes], modes: int, data: dict[str, object]) -> Markup:

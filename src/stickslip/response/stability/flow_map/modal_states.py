@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, Matrix
+from stickslip.arrays import FloatArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 
@@ -92,4 +92,4 @@ def modal_states(structure: Structure, gap_operator: Matrix, springs: FloatArray
 
 
 def _dense(matrix: Matrix) -> FloatArray:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
+    return np.asarray(as_array(matrix), dtype=float)

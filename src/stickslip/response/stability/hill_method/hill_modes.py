@@ -10,7 +10,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix, as_array
+from stickslip.harmonic.matrices import is_diagonal
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.contact_coordinates import own_motions
@@ -115,9 +116,9 @@ def hill_modes(
     feedback
         Tabulated aerodynamic force, whose frozen form is in the structure; None without one.
     """
-    m, c, k, rows = (_dense(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator))
+    m, c, k, rows = (as_array(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator))
     k = k + rows.T @ (springs[:, None] * rows)
-    loss = np.zeros_like(k) if structure.loss is None else _dense(structure.loss)
+    loss = np.zeros_like(k) if structure.loss is None else as_array(structure.loss)
     even, mass = 0.5 * (k + k.conj().T), 0.5 * (m + m.conj().T)
     shift = omega**2
     for _ in range(RAISED):
@@ -134,7 +135,7 @@ def hill_modes(
     share = _share_of_springs(parts[0], held)
     held = np.sqrt(share) * held[springs > 0.0] if share > 0.0 else held[:0]
     without = [parts[0] + held.conj().T @ held, *parts[1:]]
-    if all(_diagonal(a) for a in without):
+    if all(is_diagonal(a, COUPLED) for a in without):
         parts = [np.diagonal(a).copy() for a in without]
     else:
         held = held[:0]
@@ -196,10 +197,10 @@ class HillSide:
         if wheel.multipliers.size:
             way = own_motions(wave, wheel.multipliers)
             n = way.shape[1]
-            k, c, m = (_dense(a)[:n, :n] for a in (wave.stiffness, wave.damping, wave.mass))
-            loss = None if wave.loss is None else _dense(wave.loss)[:n, :n]
+            k, c, m = (as_array(a)[:n, :n] for a in (wave.stiffness, wave.damping, wave.mass))
+            loss = None if wave.loss is None else as_array(wave.loss)[:n, :n]
             wave = Structure(m, c, k, wave.dofs.take(np.arange(n)), loss=loss)
-            gaps = _dense(gaps) @ way
+            gaps = as_array(gaps) @ way
             force = None if force is None else replace(force, patterns=force.patterns[:n])
         return hill_modes(wave, gaps, self.springs, self.ports, self.omega, force)
 
@@ -210,13 +211,3 @@ def _share_of_springs(damping: Matrix, held: Matrix) -> float:
     off = springs - np.diag(np.diagonal(springs))
     size = float(np.vdot(off, off).real)
     return -float(np.vdot(off, damping).real) / size if size > 0.0 else 0.0
-
-
-def _diagonal(matrix: Matrix) -> bool:
-    size = np.max(np.abs(matrix), initial=0.0)
-    off = np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
-    return bool(off <= COUPLED * size)
-
-
-def _dense(matrix: Matrix) -> Matrix:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, Matrix, as_array
 from stickslip.errors import input_error
 from stickslip.model.blas_threads import threads_for
 from stickslip.model.structure import Structure
@@ -63,7 +63,7 @@ def require_array(name: str, array: FloatArray | ComplexArray, shape: tuple[int,
 
 
 def _dense(matrix: Matrix) -> FloatArray:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
+    return np.asarray(as_array(matrix), dtype=float)
 
 
 def _paces(structure: Structure, gap_operator: FloatArray, stuck: FloatArray) -> FloatArray:

@@ -24,7 +24,8 @@ from stickslip.study.file.model.bodies import Direction
 from stickslip.study.file.model.parts import union_of
 from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, own_object, shown
-from stickslip.study.own_code import is_address, of_address
+from stickslip.study.own_code import is_address
+from stickslip.study.questions import loaded
 
 POPULATIONS: dict[str, type] = {
     "uniform_band": UniformBand,
@@ -202,7 +203,7 @@ class ContactBase(Pair):
 
 def law_class(law: str) -> type:
     """Return the class of a law by its name or module path."""
-    found: type = of_address(law) if is_address(law) else ALL_LAWS[law]
+    found: type = loaded(law) if is_address(law) else ALL_LAWS[law]
     return found
 
 

@@ -1,12 +1,10 @@
 """The motion at the peak in space: meshes, bodies and contacts over a period, which the script of ``assets/shapes.js`` draws."""
 
-import base64
 import json
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import plotly.graph_objects as go
 from markupsafe import Markup
 
@@ -17,7 +15,7 @@ from stickslip.analyses.forced_response.records.columns import Drawn, read
 from stickslip.analyses.pictures import BODY, EDGES, STEEL, edges, segments, space, surface
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.report.cases import ShownCase
-from stickslip.report.plot import ALARM, INK, MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, styled
+from stickslip.report.plot import ALARM, INK, MUTED, STATE_COLOURS, STATE_NAMES, STATE_SCALE, Plot, as_base64, styled
 from stickslip.report.quantities import joined, quantity
 
 MOST_BYTES = 600_000  # all motions of a page, before they become text
@@ -114,10 +112,10 @@ def in_motion(response: Response) -> Plot | None:
         views["contacts"] = _view(_scene_of(contacts, 1.6, 0.4))
     framed = response.has("contact_frame") and bool(np.isfinite(response.values("contact_frame")).any())
     data = {
-        "points": _text(points.astype("<f4")),
-        "contacts": _text(contacts.astype("<f4")),
-        "edges": _text(pairs[sharp].astype("<i4")),
-        "frames": _text(np.nan_to_num(response.model.contact_frame).astype("<f4")) if framed else "",
+        "points": as_base64(points.astype("<f4")),
+        "contacts": as_base64(contacts.astype("<f4")),
+        "edges": as_base64(pairs[sharp].astype("<i4")),
+        "frames": as_base64(np.nan_to_num(response.model.contact_frame).astype("<f4")) if framed else "",
         "frameLength": FRAME * span,
         "span": span,
         "chosen": response.chosen,
@@ -135,16 +133,12 @@ def _payload(one: CaseMotion) -> dict[str, object]:
     parts = np.stack([one.coefficients.real, one.coefficients.imag], axis=-1)
     top = float(np.abs(parts).max(initial=0.0)) or 1.0
     return {
-        "motion": _text(np.round(parts / top * FULL).astype("<i2")),
+        "motion": as_base64(np.round(parts / top * FULL).astype("<i2")),
         "unit": MM * top / FULL,
         "harmonics": len(parts),
         "largest": MM * one.largest,
-        "states": _text(one.states.astype("<i1")),
+        "states": as_base64(one.states.astype("<i1")),
     }
-
-
-def _text(values: npt.NDArray[np.generic]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
 def _surfaces(own: Drawn, points: FloatArray) -> list[go.Mesh3d]:
