@@ -40,6 +40,21 @@ def test_a_margin_is_over_the_nearer_end(value: float, margin: float, told: str)
     assert own.where(value) == told
 
 
+@pytest.mark.parametrize(
+    ("swept", "told"),
+    [
+        ((100.0, 120.0), ""),
+        ((105.0, 130.0), "100 to 105 Hz"),
+        ((90.0, 110.0), "110 to 120 Hz"),
+        ((105.0, 110.0), "100 to 105 and 110 to 120 Hz"),
+        ((130.0, 140.0), "all"),
+        ((80.0, 90.0), "all"),
+    ],
+)
+def test_what_a_sweep_leaves_out_lies_in_the_range(swept: tuple[float, float], told: str) -> None:
+    assert Operating(100.0, 120.0, "Hz").beyond(*swept) == told
+
+
 def test_speeds_become_frequencies_by_the_engine_order_or_are_refused() -> None:
     asked = Operation(operating_rpm=[3000.0, 3600.0])
     assert of_frequencies(asked, 4) == pytest.approx((200.0, 240.0))

@@ -14,6 +14,7 @@ from stickslip.study.file.model.loads import Operation
 from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, RPM
 
+SAME_END = 1e-6  # relative difference of equal ends
 NAMED = 4  # resonances that a sentence names
 MARGIN = "The margin is relative to the nearer end of the range."
 
@@ -49,6 +50,14 @@ class Operating:
         """Return the place of a value: ``inside`` or ``5.1 % above``."""
         off = self.margin(value)
         return f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'}" if off else "inside"
+
+    def beyond(self, low: float, high: float) -> str:
+        """Return what lies beyond `low` to `high`, in words; empty for nothing."""
+        if self.lowest > high or self.highest < low:
+            return "all"
+        ends = [f"{self.lowest:.5g} to {low:.5g}"] * (self.lowest < low * (1 - SAME_END))
+        ends += [f"{high:.5g} to {self.highest:.5g}"] * (self.highest > high * (1 + SAME_END))
+        return f"{' and '.join(ends)} {self.unit}" if ends else ""
 
     @property
     def name(self) -> str:
@@ -118,7 +127,12 @@ def of_resonances(own: Operating, met: Sequence[Met], noun: str) -> Iterator[Ver
     if inside:
         more = f" and {inside - NAMED} more" if inside > NAMED else ""
         why = f"{counted(inside, noun)} inside the {own.name}, {own}: {', '.join(told[: min(inside, NAMED)])}{more}"
-        remedy = "The machine runs at these resonances: judge their amplitudes, or shift them."
+        these = (
+            ("this resonance", "its amplitude", "it")
+            if inside == 1
+            else ("these resonances", "their amplitudes", "them")
+        )
+        remedy = "The machine runs at {}: judge {}, or shift {}.".format(*these)
         yield Verdict("trusted", why=why, remedy=remedy)
         return
     where = own.where(own.at(ordered[0].rpm, ordered[0].order))

@@ -43,8 +43,10 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.slow_steps import step
 from stickslip.reduction.waves import excited_wave
 from stickslip.study.analysis import Advice, Case
+from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, millimetres
 
+BESIDE_A_RANGE = 0.005  # of an end of the operating range, that a proposed sweep leaves beside it
 NAMED_POINTS = 4  # open contact points that a line names
 APPROACH_M = 2e-4  # elastic approach of two bodies at rest: pressed metal surfaces approach by micrometres
 HEAVY = 0.3  # mass of a rigid body over the mass of all other parts: dampers weigh a few per cent of a blade
@@ -70,6 +72,7 @@ def advice(case: Case, model: Model) -> Advice:
         *nothing_pressed(question),
         *mixed_places(question.model.error_labels, question.sweep.relative_to),
         *(v for v in known if v.rank),
+        *_not_swept(question, *of_frequencies(asked_of(case), model.engine_order)),
     ]
     cost = estimate(model, question.sweep) if question.stepping is None else None
     if cost is not None and physics is not None:
@@ -142,6 +145,17 @@ def beside_the_range(question: Question) -> list[str]:
         pieces += _listed(elastic[elastic > highest][:1], "above")
         told += [f"natural frequencies{state}: {', '.join(pieces)}"] * bool(hertz.size)
     return told
+
+
+def _not_swept(question: Question, lowest: float, highest: float) -> list[Verdict]:
+    """Doubt a sweep that leaves out some of the operating range."""
+    own, swept = Operating(lowest, highest, "Hz"), [omega / HZ for omega in question.sweep.omega_range]
+    left = own.beyond(min(swept), max(swept)) if own.known else ""
+    if not left:
+        return []
+    times, why = question.driven[0], f"the sweep leaves out {left} of the operating range, {own}"
+    held = range_around(question, times * min(lowest, *swept), times * max(highest, *swept), BESIDE_A_RANGE)
+    return [Verdict("doubtful", why=why, remedy=f"Widen forced_response.{question.key}: {held} holds it.")]
 
 
 def _in_operation(question: Question, lowest: float, highest: float) -> list[str]:

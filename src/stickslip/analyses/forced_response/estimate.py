@@ -123,7 +123,7 @@ def _of_slip(ratio: float) -> str:
     if ratio < 1.0:
         return f"contacts stick at the resonance (friction forces up to {100 * ratio:.2g} % of their limit)"
     if ratio >= 1.0:
-        return f"contacts slip at the resonance (stuck, a friction force would be {ratio:.2g} times its limit)"
+        return f"contacts slip at the resonance (stuck, a friction force would be {float(f'{ratio:.2g}'):g} times its limit)"
     return "whether contacts slip is not known without a resonance in the range"
 
 

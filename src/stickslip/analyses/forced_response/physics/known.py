@@ -152,9 +152,9 @@ def proposed(question: Question) -> str:
     return range_around(question, min(together), max(together))
 
 
-def range_around(question: Question, low: float, high: float) -> str:
-    """Return the key of the range and values of it around two driven frequencies in Hz, with `ASIDE` beside them."""
-    values = np.array([low * (1.0 - ASIDE), high * (1.0 + ASIDE)]) / question.driven[0]
+def range_around(question: Question, low: float, high: float, aside: float = ASIDE) -> str:
+    """Return the key of the range and values of it around two driven frequencies in Hz, with a share beside them."""
+    values = np.array([low * (1.0 - aside), high * (1.0 + aside)]) / question.driven[0]
     if question.over_speed:
         values = values * HZ / RPM / (question.model.engine_order or 1)
     first, last = (f"{value:.{max(3, len(f'{value:.0f}'))}g}" for value in values)

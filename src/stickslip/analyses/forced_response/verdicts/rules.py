@@ -525,7 +525,6 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful", why, remedy)
 
 
-SAME_END = 1e-6  # relative difference of two frequencies that are the same end of a range
 COARSE = 0.5  # step over the half-power width above which a resonance may be missed: four points a width show each
 
 
@@ -562,10 +561,9 @@ def operation(case: Curve) -> Iterator[Finding]:
     if not own.range.known or case.peak < 0:
         return
     low, high = (own.shown(hz) for hz in (case.numbers.lowest_hz, case.numbers.highest_hz))
-    left = [f"{own.range.lowest:.5g} to {low:.5g}"] * bool(own.range.lowest < low * (1 - SAME_END))
-    left += [f"{high:.5g} to {own.range.highest:.5g}"] * bool(own.range.highest > high * (1 + SAME_END))
+    left = own.range.beyond(low, high)
     if left:
-        why = f"the sweep leaves out {' and '.join(left)} {own.range.unit} of the operating range, {own.range}"
+        why = f"the sweep leaves out {left} of the operating range, {own.range}"
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
     if case.at_the_end:  # no resonance: its own doubt
         return
