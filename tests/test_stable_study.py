@@ -53,6 +53,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
 from stickslip.response.stability.found import Floquet
+from stickslip.response.stability.missing_harmonics import with_more
 from stickslip.response.stability.multipliers import Settled
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
@@ -319,6 +320,35 @@ def test_a_neighbour_of_what_time_attained_is_not_doubted() -> None:
     # a multiplier above 1 says growth: such points are integrated themselves
     grow = [replace(e, multiplier=1.1) for e in every]
     assert neighbours_of(asked, response, grow, [peak.omega]) == grow
+    # what time confirmed with more harmonics says nothing about points solved with fewer
+    more = replace(
+        peak, raised=with_more(response.accepted[peak.position].point, np.zeros((10, 1)), np.arange(10), 0.0)
+    )
+    raised = [more if e is peak else e for e in every]
+    assert neighbours_of(asked, response, raised, [peak.omega]) == raised
+
+
+def test_a_peak_that_only_neighbours_confirm_is_integrated_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = lifted(low=7, high=7)
+    response = response_of(asked)
+    every = [
+        replace(e, verdict="stable", basis="carried", multiplier=1.0, error=0.1)
+        for e in looked_at(asked, response).values()
+    ]
+    seen: list[float] = []
+
+    def left_above(question, response, accepted, *_args, **_keys):  # type: ignore[no-untyped-def]
+        seen.append(accepted.point.omega)
+        motion = "left" if len(seen) == 1 else "attained"
+        return Check(accepted.point.omega / HZ, 1.0, 2.0, True, 100, motion=motion, refined=1.0), None
+
+    monkeypatch.setattr(examining, "integrated", left_above)
+    told = examining._confirmed_peak(asked, response, every, None)
+    peak = with_stable_peak(response, told)
+    assert len(seen) == 2
+    assert [e.verdict for e in told if e.position == response.peak] == ["unstable"]
+    assert peak.peak != response.peak
+    assert [(e.verdict, e.basis) for e in told if e.position == peak.peak] == [("stable", "examined")]
 
 
 def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(

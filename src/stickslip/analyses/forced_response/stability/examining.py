@@ -84,7 +84,8 @@ def neighbours_of(
 ) -> list[Examined]:
     """Return all points; undecided ones are stable next to a point with the same transitions that is confirmed in time.
 
-    Not those with a multiplier above 1: it says growth, though within its error.
+    Not those with a multiplier above 1: it says growth, though within its error. Nor points with fewer harmonics than the confirmed
+    motion, which may be another one.
     """
     known = [e for e in examined if e.omega in attained]
     if not known or not any(e.verdict == "undecided" for e in examined):
@@ -95,7 +96,9 @@ def neighbours_of(
     def beside(e: Examined) -> Examined:
         if e.verdict != "undecided" or e.motion or e.multiplier > 1.0:
             return e
-        near = [k for k in known if course.like(place[k.position], place[e.position])]
+        order = response.accepted[e.position].point.order
+        fewer = (k for k in known if (k.raised or response.accepted[k.position].point).order <= order)
+        near = [k for k in fewer if course.like(place[k.position], place[e.position])]
         if not near:
             return e
         said = (
@@ -404,7 +407,23 @@ def with_stability(
     if raised:
         response = collect(question.problem, [*solved, *raised], question.model.peak_output)
         examined = _with_peak(response, examined, look)
+    examined = _confirmed_peak(question, response, examined, notes)
     return with_stable_peak(response, examined), examined
+
+
+def _confirmed_peak(question: Question, response: Response, examined: list[Examined], notes: Notes) -> list[Examined]:
+    """Integrate in time at a peak whose stability only neighbours confirm; if its motion is left, the next largest is the peak."""
+    if question.stepping is not None or not integrable(question):
+        return examined
+    for _ in range(MOST_PEAKS):
+        peak = with_stable_peak(response, examined)
+        own = next((e for e in examined if e.position == peak.peak), None)
+        if own is None or peak.top is None or own.basis != "carried" or own.multiplier + own.error < 1.0:
+            break
+        check, _raised = integrated(question, peak, peak.top, examined, notes)
+        told = with_motion(replace(own, verdict="undecided", basis="examined"), check)
+        examined = [told if e.position == peak.peak else e for e in examined]
+    return examined
 
 
 def _with_peak(response: Response, examined: list[Examined], look: Looked) -> list[Examined]:
