@@ -147,6 +147,10 @@ class Everywhere:
         found = np.hstack([rows @ self._expand(own, harmonic) for own in each])
         return found.astype(np.complex64 if np.iscomplexobj(found) else np.float32)
 
+    def modes(self, harmonic: int) -> Matrix:
+        """Return the (N, n) matrix from the coordinates to all dofs of a sector, in the wave of a harmonic."""
+        return np.asarray(self._expand(np.eye(self.system.structure.n), harmonic))
+
     def phase(self, harmonic: int, sector: int) -> complex:
         """Return the phase factor of a harmonic between a sector and sector 0, if all sectors are alike.
 
