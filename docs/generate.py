@@ -25,6 +25,7 @@ PAGES_OF_KEYS = {
     "parts": ("Parts", ("part",)),
     "contacts": ("Contacts and joins", ("contact", "join")),
     "loads": ("Loads, rotation, operating range", ("load", "rotation", "operation")),
+    "stress": ("Stress and margin", ("stress",)),
     "aero": ("Aerodynamic coefficients", ("aero",)),
     "mistuning": ("Mistuning", ("mistuning",)),
     "output": ("Output and measured peaks", ("output", "measured")),

@@ -9,7 +9,7 @@ from test_assembly_wheel import ORDER, SECTORS, sector_model, shrouded_sector
 
 from stickslip.api.model import Model
 from stickslip.assembly.forces import force_of
-from stickslip.assembly.node_motion import node_motion
+from stickslip.assembly.full_field import node_motion
 from stickslip.assembly.part_reduction import at_speed, steady_load
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.model.fe.solid import Material

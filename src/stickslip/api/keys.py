@@ -85,8 +85,35 @@ class OperationKeys(TypedDict, total=False):
     """operating speeds [lowest, highest] in rpm, for [campbell], [safe] and [run_up], and for [forced_response] with an engine order"""
 
 
-class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, total=False):
-    """Keys of [forced_response], [harmonics], [solver], [limits] and [operation]."""
+class StressKeys(TypedDict, total=False):
+    """Keys of [stress]."""
+
+    fatigue_limit_pa: float | None
+    """stress amplitude in Pa that is endured at R = -1; it asks for stress and margin"""
+    ultimate_pa: float | None
+    """tensile strength in Pa, for goodman and gerber"""
+    yield_pa: float | None
+    """0.2 % proof stress in Pa: where the static stress is larger there is no margin; for soderberg"""
+    fracture_pa: float | None
+    """true fracture strength in Pa, for morrow"""
+    walker_exponent: float | None
+    """Walker's exponent γ, for walker, up to 1"""
+    fatigue_limit_r0_pa: float | None
+    """stress amplitude, half of the range, in Pa that is endured at R = 0, for sines and dang_van"""
+    torsion_limit_pa: float | None
+    """amplitude of the shear stress in Pa that is endured under alternating torsion, for crossland"""
+    mean_stress: Literal["goodman", "gerber", "soderberg", "morrow", "walker"]
+    """line of the Haigh diagram from the fatigue limit to the static limit; default 'goodman'"""
+    above_yield: Literal["void", "shakedown"]
+    """where the elastic static stress is above yield. void: there is no margin; shakedown: the mean stress is at most yield less the amplitude; default 'void'"""
+    credit_in_compression: bool
+    """whether a compressive mean stress raises the allowed amplitude; default False"""
+    apart_m: float | None
+    """distance in m from contacts, joins, supports and loaded nodes within which stress is listed apart, as elastic stress is singular there; left out: one element"""
+
+
+class ForcedResponseKeys(HarmonicsKeys, SolverKeys, LimitsKeys, OperationKeys, StressKeys, total=False):
+    """Keys of [forced_response], [harmonics], [solver], [limits], [operation] and [stress]."""
 
     frequency_hz: Sequence[float] | FloatArray | None
     """the range [lowest, highest] in Hz, the lower frequency first"""

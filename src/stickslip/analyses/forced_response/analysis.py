@@ -19,6 +19,7 @@ from stickslip.analyses.forced_response.problem import (
     STABLE,
     Question,
     question_of,
+    strength_of,
     with_comparisons,
 )
 from stickslip.analyses.forced_response.records.blades import of_blades
@@ -49,6 +50,7 @@ from stickslip.analyses.forced_response.stability.not_periodic import (
 )
 from stickslip.analyses.forced_response.stability.stable import Examined, with_motion, without_raised
 from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
+from stickslip.analyses.forced_response.stress import of_stress
 from stickslip.analyses.forced_response.summary import tables
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.cases import verdicts
@@ -76,6 +78,7 @@ COMPILED = 5.0  # seconds of the first evaluation, below which the code was alre
 BLADES = "blades"  # note of a mistuned wheel
 BIFURCATIONS = "bifurcations"
 JACOBIANS = "jacobians"
+STRESS = "stress"
 NOT_PERIODIC = "not_periodic"
 NOTES = (
     "model",
@@ -88,7 +91,18 @@ NOTES = (
     HARMONICS,
     JACOBIANS,
     PHYSICS,
+    STRESS,
 )  # notes that make up the dataset
+
+
+_OWN_TABLES = of_tables("forced_response", "harmonics", "solver")
+
+
+def _key(case: Case) -> str:
+    """Return what the records depend on; results without [stress] keep their keys."""
+    strength = strength_of(case)
+    own = _OWN_TABLES(case)
+    return own if strength.fatigue_limit_pa is None else own + strength.model_dump_json()
 
 
 def _inputs(case: Case, model: Model) -> Question:
@@ -126,11 +140,19 @@ def _solve(inputs: Question, done: Sequence[ForcedPoint], notes: Notes) -> Itera
         stage("bifurcations and side branches")
         notes.put(BIFURCATIONS, _bifurcations(inputs, response, told, notes))
     _check_harmonics(inputs, response, notes)
-    if notes.get(PHYSICS) is None:
-        stage("what the peak owes to the model: more modes, softer contacts")
-        notes.put(PHYSICS, _of_physics(inputs, response))
+    _of_peak(inputs, response, notes)
     if failure is not None:
         raise failure
+
+
+def _of_peak(question: Question, response: Response, notes: Notes) -> None:
+    """Store what the peak owes to the model, and its stress, once."""
+    if notes.get(PHYSICS) is None:
+        stage("what the peak owes to the model: more modes, softer contacts")
+        notes.put(PHYSICS, _of_physics(question, response))
+    if question.stress is not None and notes.get(STRESS) is None:
+        stage("stress at the peak")
+        notes.put(STRESS, of_stress(question, response))
 
 
 def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
@@ -346,13 +368,13 @@ FORCED_RESPONSE = Analysis(
     name="forced_response",
     table=ForcedResponse,
     record=ForcedPoint,
-    key=of_tables("forced_response", "harmonics", "solver"),
+    key=_key,
     inputs=_inputs,
     solve=_solve,
     dataset=_dataset,
     check=advice,
     summary=tables,
-    shared=("harmonics", "solver", "limits", "operation"),
+    shared=("harmonics", "solver", "limits", "operation", "stress"),
     answers=KINDS,
     checks=(IN_TIME, HARMONICS),
     verdicts=_verdicts,

@@ -29,6 +29,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.model.strength import StrengthCard, allowable_amplitude
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
@@ -39,6 +40,7 @@ from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analysis import Case
 from stickslip.study.file.harmonics import HIGHEST
+from stickslip.study.file.model.strength import Stress
 from stickslip.study.verdict import said
 from stickslip.units import HZ, RPM
 
@@ -129,6 +131,7 @@ def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, floa
     return lowest, highest
 
 
+HAIGH_POINTS = 65  # of the line of a Haigh diagram
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
 STILL_HZ = 5e-3  # lower frequencies are those of rigid motions
 STABLE = "stability"  # check of every run, unless the study turns it off
@@ -138,6 +141,43 @@ ALONE = "of what contacts, loads and outputs keep alone"  # part of the same sen
 MAX_COMPARED_ROWS = 2000  # rows of dense Jacobians: some seconds a point
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
+
+
+@dataclass(frozen=True, eq=False)
+class StressAsked:
+    """The model whose stress is asked for, and how it is judged.
+
+    Parameters
+    ----------
+    model
+        The model before its assembly.
+    orders
+        Highest harmonics with which its assembly is tried, until the outputs agree.
+    card
+        Strength of the material.
+    mean_stress, above_yield, credit_in_compression
+        As in `stickslip.model.strength.margin`.
+    apart
+        Distance from contacts, joins, supports and loaded nodes that counts as singular, m; None: one element.
+    """
+
+    model: Model
+    orders: tuple[int, int]
+    card: StrengthCard
+    mean_stress: str = "goodman"
+    above_yield: Literal["void", "shakedown"] = "void"
+    credit_in_compression: bool = False
+    apart: float | None = None
+
+    @property
+    def line(self) -> tuple[FloatArray, FloatArray]:
+        """Mean stress and allowed amplitude of the Haigh diagram, (n,) each, Pa."""
+        limits = (self.card.yield_pa, self.card.ultimate_pa, self.card.fracture_pa, self.card.fatigue_limit_pa)
+        end = next(float(np.max(limit)) for limit in limits if limit is not None)
+        mean = np.linspace(-end, end, HAIGH_POINTS)
+        return mean, allowable_amplitude(
+            self.mean_stress, self.card, mean, credit_in_compression=self.credit_in_compression
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +224,8 @@ class Question:
         Geometry for pictures of the model; None without pictures.
     stepping
         Time steps of a response by shooting; None: by harmonic balance.
+    stress
+        How the stress at the peak is judged; None: it is not asked for.
     """
 
     label: str
@@ -205,6 +247,7 @@ class Question:
     similarity: bool = False
     scene: Scene | None = None
     stepping: TimeStepping | None = None
+    stress: StressAsked | None = None
 
     @property
     def over_speed(self) -> bool:
@@ -308,7 +351,50 @@ def with_comparisons(question: Question, case: Case, model: Model) -> Question:
     richer = None if more is None else (more.system, more.load)
     # pictures show one sector, but a mistuned wheel has the contacts of all sectors
     scene = scene_of(model, order) if model.mistuning is None else None
-    return replace(question, richer=richer, extent=extent_of(model, order), scene=scene)
+    stress = _stress_of(case, model, question.sweep)
+    return replace(question, richer=richer, extent=extent_of(model, order), scene=scene, stress=stress)
+
+
+def _stress_of(case: Case, model: Model, sweep: Sweep) -> StressAsked | None:
+    table = strength_of(case)
+    if table.fatigue_limit_pa is None:
+        return None
+    highest = int(sweep.high_harmonics[-1])
+    return StressAsked(
+        model=model,
+        orders=(JUDGED_MULTIPLE * highest, highest),
+        card=table.card(),
+        mean_stress=table.mean_stress,
+        above_yield=table.above_yield,
+        credit_in_compression=table.credit_in_compression,
+        apart=table.apart_m,
+    )
+
+
+def strength_of(case: Case) -> Stress:
+    """Return the table [stress] of a case; an empty one for a case whose tables lack it."""
+    found: Stress = getattr(case.settings, "stress", None) or Stress()
+    return found
+
+
+def _refuse_stress(case: Case, model: Model) -> None:
+    """Refuse the stress of a model that has none, and a rule whose limits are missing."""
+    table = strength_of(case)
+    if table.fatigue_limit_pa is None:
+        return
+    key = "stress.fatigue_limit_pa"
+    if model.mistuning is not None:
+        raise input_error(
+            key, "asks for the stress of a mistuned wheel, which is not computed", "Leave [mistuning] out."
+        )
+    if model.stages is not None:
+        raise input_error(key, "asks for the stress of several coupled wheels, which is not computed", "Ask one wheel.")
+    if all(part.solid is None for part in model.parts.values()):
+        raise input_error(
+            key,
+            "asks for stress, and no part has elements and a material",
+            "Give the deck with its elements instead of matrices, or remove [stress].",
+        )
 
 
 def question_of(case: Case, model: Model) -> Question:
@@ -370,6 +456,7 @@ def question_of(case: Case, model: Model) -> Question:
 def _refuse_beforehand(case: Case, model: Model, sweep: Sweep, stepping: TimeStepping | None) -> None:
     """Refuse what the model cannot answer, before it is assembled; `stepping`: time steps of a response by shooting."""
     settings = case.settings
+    _refuse_stress(case, model)
     if stepping is not None:
         require_shooting(settings, model, case.checks)
         return

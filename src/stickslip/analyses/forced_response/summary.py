@@ -23,6 +23,7 @@ from stickslip.analyses.forced_response.records.columns import (
 )
 from stickslip.analyses.forced_response.stability.stable_words import all_lines, said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.margin import stress_table
 from stickslip.analyses.forced_response.verdicts.working_range import TITLE, range_lines
 from stickslip.arrays import IntArray, TextArray
 from stickslip.harmonic.harmonic_set import named
@@ -65,6 +66,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
         _of_orders(data, labels),
         _of_blades(data, labels),
+        stress_table(data, labels),
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data), detail=True),
         _lines("Against more harmonics", _sentences(labels, harmonics)),

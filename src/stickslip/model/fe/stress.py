@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.cell_laws import CellLaws, laws_of_group
 from stickslip.model.fe.cell_matrices import cell_stiffness, inner_motion, strain_operator
@@ -82,7 +82,7 @@ def stress_places(laws: CellLaws) -> StressPlaces:
     return StressPlaces(*np.divmod(found, len(laws.each)))
 
 
-def nodal_stress(solid: RotatingSolid, displacement: FloatArray, *, heated: bool = False) -> FloatArray:
+def nodal_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bool = False) -> Matrix:
     """Return the stress at the nodes, extrapolated from the integration points of each cell and averaged over cells of one material.
 
     Within a cell the stress fits the integration points (least squares): with the shape functions of all nodes if there are as many
@@ -112,7 +112,7 @@ def nodal_stress(solid: RotatingSolid, displacement: FloatArray, *, heated: bool
     return _as_given(np.concatenate(blocks, axis=2), displacement)
 
 
-def integration_stress(solid: RotatingSolid, displacement: FloatArray, *, heated: bool = False) -> list[PointStress]:
+def integration_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bool = False) -> list[PointStress]:
     """Return the stress at the integration points for the stiffness, one entry for each of the solid's `cell_groups`.
 
     Bricks with one integration point have one stress; hourglass control has none.
@@ -136,7 +136,7 @@ def integration_stress(solid: RotatingSolid, displacement: FloatArray, *, heated
     return found
 
 
-def stress_error(solid: RotatingSolid, displacement: FloatArray, *, heated: bool = False) -> StressError:
+def stress_error(solid: RotatingSolid, displacement: Matrix, *, heated: bool = False) -> StressError:
     """Estimate the error of the stress from the difference of an averaged stress and that of each cell.
 
     ``‖e‖² = ∫ (σ* − σ)ᵀ C⁻¹ (σ* − σ) dV`` over ``‖σ‖² + ‖e‖²`` (Zienkiewicz and Zhu 1987). σ* is averaged as in `nodal_stress`; in cells
@@ -166,7 +166,7 @@ def stress_error(solid: RotatingSolid, displacement: FloatArray, *, heated: bool
     )
 
 
-def _relative(squares: FloatArray, displacement: FloatArray) -> FloatArray:
+def _relative(squares: FloatArray, displacement: Matrix) -> FloatArray:
     """Return (f, ...) errors from squares of error and stress (2, ..., real fields); zero where there is neither."""
     if np.iscomplexobj(displacement):
         squares = squares.reshape(*squares.shape[:-1], -1, 2).sum(axis=-1)
@@ -269,7 +269,7 @@ def _extrapolation(width: int, rule: Quadrature) -> FloatArray:
     return np.vstack([onto, onto[np.array(EDGES[corners])].mean(axis=1)])
 
 
-def _real_fields(solid: RotatingSolid, displacement: FloatArray, *, heated: bool) -> Iterator[FloatArray]:
+def _real_fields(solid: RotatingSolid, displacement: Matrix, *, heated: bool) -> Iterator[FloatArray]:
     """Yield (nodes, 3, at most `FIELDS`) real fields; a complex field is two of them, one behind the other."""
     n = len(solid.mesh.points)
     if displacement.ndim != 3 or displacement.shape[1:] != (n, 3):
@@ -291,7 +291,7 @@ def _real_fields(solid: RotatingSolid, displacement: FloatArray, *, heated: bool
         yield np.ascontiguousarray(block, dtype=kind).view(np.float64)
 
 
-def _as_given(values: FloatArray, displacement: FloatArray) -> FloatArray:
+def _as_given(values: FloatArray, displacement: Matrix) -> FloatArray:
     """Return values (..., real fields) as (f, ...), complex if the displacement is."""
     whole = values.view(np.complex128) if np.iscomplexobj(displacement) else values
     return np.ascontiguousarray(np.moveaxis(whole, -1, 0))

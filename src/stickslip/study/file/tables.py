@@ -15,6 +15,7 @@ from stickslip.study.file.model.loads import Limits, LoadTable, Operation, Outpu
 from stickslip.study.file.model.material import DampingTable, MaterialTable, StudyReduction, TemperatureTable
 from stickslip.study.file.model.mistuning import MistuningTable
 from stickslip.study.file.model.parts import AnyPart, Copy
+from stickslip.study.file.model.strength import Stress
 from stickslip.study.file.section import FilePath, Name, Section
 from stickslip.study.questions import ANALYSES, loaded
 
@@ -92,6 +93,7 @@ class Tables(Section):
     load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
     operation: Operation = Field(default_factory=Operation, description="the table [operation], where the machine runs")
+    stress: Stress = Field(default_factory=Stress, description="the table [stress], strength of the material")
     aero: AeroTable | None = Field(None, description="the table [aero], of aerodynamic influence coefficients")
     mistuning: dict[Name, MistuningTable] = Field(
         default_factory=dict, description="the tables [mistuning.NAME], of what differs from sector to sector"

@@ -36,6 +36,13 @@ from stickslip.analyses.forced_response.page.harmonics import (
 from stickslip.analyses.forced_response.page.jacobians import jacobian_blocks, jacobian_change
 from stickslip.analyses.forced_response.page.optimisation import optimisation, what_is_needed, where_friction_works
 from stickslip.analyses.forced_response.page.response import NEEDED, Response
+from stickslip.analyses.forced_response.page.stress import (
+    haigh,
+    stress_card,
+    stress_cycle,
+    stress_surface,
+    worst_places,
+)
 from stickslip.analyses.forced_response.page.wheel import (
     blades,
     peaks_of_blades,
@@ -243,6 +250,7 @@ def cards(response: Response) -> list[Card]:
     """Return the numbers at the head of the page, the answer first."""
     found = (
         _answer(response),
+        stress_card(response),
         _damping_card(response),
         _blade_card(response),
         _operation_card(response),
@@ -335,6 +343,7 @@ SECTION: Section = Section(
     (
         Block("response", "Forced response", (frequency_response, of_each_order)),
         Block("optimisation", "Optimisation curves", (optimisation, where_friction_works, what_is_needed)),
+        Block("stress", "Stress and margin", (chosen_case, stress_surface, haigh, worst_places, stress_cycle)),
         Block("wheel", "Blades of the wheel", (blades, peaks_of_blades, wheel_at_peak, wheel_in_motion, statistics)),
         Block(
             "contact",

@@ -21,6 +21,7 @@ from stickslip.study.verdict import LEVELS, POINT_LEVELS
 
 Kind = TypeVar("Kind")
 STAGES = get_args(Stage)
+STRESS_AT = ("free", "contact", "joint", "support", "load")  # codes of stress_at
 MOTION = {"stable": 0, "unstable": 1, "undecided": 2, "not examined": 3, "neutral": 4}  # codes of motion_stability
 
 
@@ -608,6 +609,54 @@ class StiffnessChange:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class SurfaceStress:
+    """Stress at the peak at the corner nodes of the surfaces of meshed parts, one sector, and its margin."""
+
+    stress_point: FloatArray = column("m", "nodes of the surfaces", along="case stress_place xyz")
+    stress_node: IntArray = column("1", "their numbers in the mesh", along="case stress_place")
+    stress_part: TextArray = column("1", "their parts", along="case stress_place")
+    stress_triangle: IntArray | None = column("1", "triangles between them", along="stress_face corner", default=None)
+    stress_at: IntArray = column(
+        "1",
+        "where elastic stress is singular: at a contact, a joint, a support or a loaded node; free elsewhere",
+        along="case stress_place",
+    )
+    alternating_stress: FloatArray = column(
+        "Pa", "largest equivalent stress (von Mises) of the vibration over its phase", along="case stress_place"
+    )
+    mean_stress: FloatArray = column(
+        "Pa",
+        "equivalent stress of the static state, with the sign of its largest principal stress",
+        along="case stress_place",
+    )
+    allowed_stress: FloatArray = column(
+        "Pa", "alternating stress that the material endures at this mean stress", along="case stress_place"
+    )
+    utilisation: FloatArray = column(
+        "1", "alternating over allowed stress; NaN where the static stress is above yield", along="case stress_place"
+    )
+    stress_mesh_error: FloatArray = column(
+        "1",
+        "estimated error of the alternating stress by the mesh, in the energy norm around the node",
+        along="case stress_place",
+    )
+    stress_correction: FloatArray = column(
+        "1",
+        "change of the alternating stress by the modes that the reduction left out, relative",
+        along="case stress_place",
+    )
+    worst_place: IntArray = column(
+        "1", "places with the largest utilisation away from singular ones, the worst first", along="case worst"
+    )
+    worst_stress: FloatArray = column(
+        "Pa", "their stress xx, yy, zz, xy, yz, xz in each harmonic", along="case stress_harmonic worst component part"
+    )
+    fatigue_limit: float = column("Pa", "amplitude endured at R = -1", along="case")
+    haigh_mean: FloatArray = column("Pa", "mean stress of the Haigh diagram", along="case haigh")
+    haigh_amplitude: FloatArray = column("Pa", "amplitude endured at that mean stress", along="case haigh")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Blades:
     """A mistuned wheel compared with the tuned one."""
 
@@ -670,6 +719,7 @@ KINDS = (
     MotionAtPeak,
     ModelChanges,
     StiffnessChange,
+    SurfaceStress,
     Blades,
 )
 COLUMNS: Mapping[str, Column] = {name: own for kind in KINDS for name, own in columns_of(kind).items()}
@@ -739,6 +789,7 @@ def flags(name: str) -> dict[str, IntArray | str]:
         "peak_state": {"stick": 0, "slip": 1, "open": 2},
         "motion_stability": {word.replace(" ", "_"): i for word, i in MOTION.items()},
         "motion_stability_basis": {"not_examined": 0, "examined": 1, "carried": 2, "by_sign": 3},
+        "stress_at": {place: i for i, place in enumerate(STRESS_AT)},
         "verdict": {level: i for i, level in enumerate(POINT_LEVELS)},
         "case_verdict": {level: i for i, level in enumerate(LEVELS)},
     }.get(name)

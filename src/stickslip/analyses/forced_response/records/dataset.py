@@ -24,8 +24,12 @@ COUNTED = (
     "mode",
     "drawn_node",
     "drawn_harmonic",
+    "stress_place",
+    "stress_harmonic",
+    "worst",
 )  # dimensions that may be longer in one case than in another
 AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
+AXES["component"] = ["xx", "yy", "zz", "xy", "yz", "xz"]
 
 
 def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:

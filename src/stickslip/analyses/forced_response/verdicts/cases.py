@@ -11,6 +11,7 @@ from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.records.columns import Verdicts, stored
 from stickslip.analyses.forced_response.stability.stable_words import said_of
 from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.margin import margin_to_fatigue
 from stickslip.analyses.forced_response.verdicts.rules import (
     LEFT,
     PHYSICS_RULES,
@@ -134,7 +135,7 @@ def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
     """
     curves = [Curve(data, i) for i in range(len(labels))]
     return tuple(
-        Judged(label, curve, tuple(tuple(rule(curve)) for rule in (*RULES, *PHYSICS_RULES)))
+        Judged(label, curve, tuple(tuple(rule(curve)) for rule in (margin_to_fatigue, *RULES, *PHYSICS_RULES)))
         for label, curve in zip(labels, curves, strict=True)
     )
 

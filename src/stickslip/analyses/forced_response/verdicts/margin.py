@@ -1,0 +1,108 @@
+"""Verdicts on the stress at the peak: utilisation, static stress above yield, mesh and reduction."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from stickslip.analyses.forced_response.records.columns import SurfaceStress, holds, read
+from stickslip.analyses.forced_response.verdicts.curve import Curve
+from stickslip.analyses.forced_response.verdicts.rules import Finding
+from stickslip.arrays import IntArray
+from stickslip.study.analysis import TextTable
+
+COARSE = 0.1  # relative error of the stress by the mesh, in the energy norm, that is told
+MPA = 1e6
+
+
+@dataclass(frozen=True)
+class Place:
+    """A node of a surface and its margin, in SI units."""
+
+    name: str
+    where: str
+    alternating: float
+    mean: float
+    allowed: float
+    utilisation: float
+    mesh_error: float
+    correction: float
+
+
+def places_of(own: SurfaceStress, at: IntArray) -> list[Place]:
+    """Return places by their indices; negative ones are padding."""
+    return [
+        Place(
+            f"node {int(own.stress_node[k])} of {own.stress_part[k]}",
+            ", ".join(f"{1e3 * v:.2f}" for v in own.stress_point[k]),
+            *(
+                float(values[k])
+                for values in (
+                    own.alternating_stress,
+                    own.mean_stress,
+                    own.allowed_stress,
+                    own.utilisation,
+                    own.stress_mesh_error,
+                    own.stress_correction,
+                )
+            ),
+        )
+        for k in at[at >= 0]
+    ]
+
+
+def worst_of(own: SurfaceStress) -> Place | None:
+    """Return the place with the largest utilisation away from singular places; None without any."""
+    return next(iter(places_of(own, own.worst_place[:1])), None)
+
+
+def size_of(value: float) -> str:
+    """Return a stress as text in MPa."""
+    return f"{value / MPA:.4g} MPa"
+
+
+def margin_to_fatigue(case: Curve) -> Iterator[Finding]:
+    """Tell the utilisation of the fatigue limit, and what limits it."""
+    if not holds(SurfaceStress, case.data):
+        return
+    own = case.read(SurfaceStress)
+    place = worst_of(own)
+    if place is None:
+        return
+    here = f"{place.name} ({place.where} mm)"
+    if not np.isfinite(place.utilisation):
+        why = (
+            f"the elastic static stress at {here} is {size_of(abs(place.mean))}, above yield: there is no margin there"
+        )
+        remedy = 'Give stress.above_yield = "shakedown" if the material shakes down, or compute the static state with plasticity.'
+        yield Finding("doubtful", why, remedy)
+        return
+    exceeds = "the fatigue limit is exceeded: " if place.utilisation >= 1.0 else ""
+    why = (
+        f"{exceeds}utilisation {place.utilisation:.3g} at {here}, alternating {size_of(place.alternating)} of "
+        f"{size_of(place.allowed)} endured at a mean of {size_of(place.mean)}"
+    )
+    yield Finding(
+        "trusted", why, "Elastic stress at contacts, joins, supports and loaded nodes is singular and does not count."
+    )
+    if place.correction > case.limit:
+        why = f"modes that the reduction leaves out change the alternating stress at {place.name} by {100 * place.correction:.2g} %"
+        yield Finding("doubtful", why, "Keep more modes ([reduction]).")
+    if place.mesh_error > COARSE:
+        why = f"the mesh is coarse at {place.name}: the error of its stress is estimated at {100 * place.mesh_error:.2g} % in the energy norm"
+        yield Finding("trusted", why, "Refine the mesh there, and round sharp inner edges.")
+
+
+def stress_table(data: xr.Dataset, labels: list[str]) -> TextTable:
+    """Return the terminal table of utilisations; without rows if the study asks for none."""
+    head = ("case", "utilisation", "alternating MPa", "mean MPa", "endured MPa", "worst place", "x, y, z mm")
+    rows = []
+    if holds(SurfaceStress, data):
+        for i, label in enumerate(labels):
+            place = worst_of(read(SurfaceStress, data, i))
+            if place is not None:
+                used = f"{place.utilisation:.3g}" if np.isfinite(place.utilisation) else "void, above yield"
+                sizes = (f"{value / MPA:.4g}" for value in (place.alternating, place.mean, place.allowed))
+                rows.append((label, used, *sizes, place.name, place.where))
+    return TextTable("Stress at the peak", head, tuple(rows))
