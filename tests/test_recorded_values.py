@@ -816,6 +816,8 @@ def test_points_of_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
         "dissipated_w": [1.5 * 50.0, 0.75 * 55.0, NAN],
         "slipping": [0.5, 0.5, NAN],
         "opening": [0.5, 0.5, NAN],
+        "operating_lowest_rpm": NAN,
+        "operating_highest_rpm": NAN,
     }
     assert set(found) == set(expected)
     for name, value in expected.items():

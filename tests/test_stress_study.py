@@ -102,6 +102,16 @@ def test_stress_and_margin_are_those_of_beam_theory(cantilever: Any) -> None:
     assert mean > 0
     assert data.utilisation.values[place] == pytest.approx(amplitude / (30e6 * (1 - mean / 100e6)), rel=1e-12)
     assert x[place] <= 0.041
+    assert data.allowed_stress.values[place] == pytest.approx(30e6 * (1 - mean / 100e6), rel=1e-12)
+    assert data.stress_node.values[place] > 0
+    assert data.stress_part.values[place] == "beam"
+    assert data.stress_triangle.values.max() == data.sizes["stress_place"] - 1
+    assert float(data.fatigue_limit) == 30e6
+    assert str(data.stress_doubt.values) == ""
+    assert np.interp(50e6, data.haigh_mean.values, data.haigh_amplitude.values) == pytest.approx(15e6, rel=1e-12)
+    assert np.interp(-50e6, data.haigh_mean.values, data.haigh_amplitude.values) == pytest.approx(30e6, rel=1e-12)
+    assert 0 < data.stress_mesh_error.values[place] < 0.1
+    assert 0 < data.stress_correction.values[place] < 0.01
     kinds = {STRESS_AT[k] for k in data.stress_at.values}
     assert kinds == {"free", "contact", "support", "load"}
     assert np.all(x[data.stress_at.values == STRESS_AT.index("support")] <= 0.0201)
@@ -139,7 +149,34 @@ def test_a_static_stress_above_yield_voids_the_margin(tmp_path: Path) -> None:
     shaken = written(tmp_path, STUDY.replace("force_n = 50.0", "force_n = 900.0") + 'above_yield = "shakedown"\n')
     result = ss.Study.from_file(shaken).run()
     data = result["forced_response"].isel(case=0)
-    assert np.isfinite(data.utilisation.values[int(data.worst_place.values[0])])
+    place = int(data.worst_place.values[0])
+    amplitude, mean = data.alternating_stress.values[place], data.mean_stress.values[place]
+    assert int(data.stress_shakes) == 1
+    assert mean == pytest.approx(80e6 - amplitude, rel=1e-9)
+    assert data.utilisation.values[place] == pytest.approx(amplitude / (30e6 * (1 - mean / 100e6)), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ("fatigue_limit_pa = 1e6\nultimate_pa = 2e6\n", "is beyond the static limit: no amplitude is endured"),
+        (
+            'fatigue_limit_pa = 1e6\nultimate_pa = 8e6\nyield_pa = 7e6\nabove_yield = "shakedown"\n',
+            "the material does not shake down",
+        ),
+        ("fatigue_limit_pa = 30e6\nultimate_pa = 100e6\n", "whether the static stress is above yield is not known"),
+        (
+            "fatigue_limit_pa = 30e6\nultimate_pa = 100e6\napart_m = 10.0\n",
+            "no place of a surface is away from contacts",
+        ),
+    ],
+    ids=["beyond", "no shakedown", "no yield", "nothing free"],
+)
+def test_what_leaves_no_margin_is_told_as_it_is(tmp_path: Path, keys: str, says: str) -> None:
+    text = STUDY.partition("[stress]")[0] + "[stress]\n" + keys
+    result = ss.Study.from_file(written(tmp_path, text)).run()
+    assert any(says in v.why for v in result.verdicts)
+    assert not any("above yield: there is no margin there" in v.why for v in result.verdicts)
 
 
 @pytest.mark.parametrize(
@@ -148,6 +185,12 @@ def test_a_static_stress_above_yield_voids_the_margin(tmp_path: Path) -> None:
         ("fatigue_limit_pa = 30e6\n", "", r"stress.fatigue_limit_pa: is missing"),
         ("ultimate_pa = 100e6\n", "", r"stress.ultimate_pa: is missing, and Goodman's line needs it"),
         ("fatigue_limit_pa = 30e6", "fatigue_limit_pa = 30.0", r"stress.fatigue_limit_pa: must lie in .*, got 30"),
+        ("yield_pa = 80e6", 'above_yield = "shakedown"', r"stress.yield_pa: is missing"),
+        (
+            "yield_pa = 80e6",
+            'credit_in_compression = true\nmean_stress = "gerber"',
+            r"stress.credit_in_compression: is true",
+        ),
         ("yield_pa = 80e6", "yield_pa = 200e6", r"stress.yield_pa: must be at most ultimate_pa"),
     ],
 )

@@ -111,6 +111,9 @@ class Estimate:
         )
 
 
+GROSS_SLIP = 10  # times the limit of friction, above which the number says no more
+
+
 def lasting(seconds: float) -> str:
     """Return a time in words, short ones with one digit."""
     return (
@@ -123,7 +126,8 @@ def _of_slip(ratio: float) -> str:
     if ratio < 1.0:
         return f"contacts stick at the resonance (friction forces up to {100 * ratio:.2g} % of their limit)"
     if ratio >= 1.0:
-        return f"contacts slip at the resonance (stuck, a friction force would be {float(f'{ratio:.2g}'):g} times its limit)"
+        size = f"{ratio:.2g}" if ratio < GROSS_SLIP else f"more than {GROSS_SLIP}"
+        return f"contacts slip at the resonance (stuck, a friction force would be {size} times its limit)"
     return "whether contacts slip is not known without a resonance in the range"
 
 

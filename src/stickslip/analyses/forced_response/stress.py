@@ -68,13 +68,15 @@ def of_stress(question: Question, response: Response) -> Values:
             stress_triangle=np.vstack([own.triangles + n for own, n in zip(each.values(), first, strict=False)]),
             stress_at=at,
             alternating_stress=alternating,
-            mean_stress=mean,
+            mean_stress=np.where(np.isfinite(found.mean), found.mean, mean),
             allowed_stress=found.allowed,
             utilisation=found.utilisation,
             stress_mesh_error=np.concatenate([own.error for own in each.values()]),
             stress_correction=_relative(alternating - uncorrected, alternating),
             worst_place=order,
             worst_stress=np.stack([cycle.real, cycle.imag], axis=-1),
+            stress_doubt=found.doubt,
+            stress_shakes=int(asked.above_yield == "shakedown"),
             fatigue_limit=float(np.max(asked.card.fatigue_limit_pa)),
             haigh_mean=asked.line[0],
             haigh_amplitude=asked.line[1],
@@ -88,10 +90,10 @@ def _relative(change: FloatArray, of: FloatArray) -> FloatArray:
 
 def _worst(utilisation: FloatArray, alternating: FloatArray, at: IntArray) -> IntArray:
     """Return the places with the largest utilisation away from contacts, joins, supports and loads, the worst first; void ones lead."""
-    rank = np.where(np.isfinite(utilisation), utilisation, np.inf)
+    rank = np.where(np.isnan(utilisation), np.inf, utilisation)
     rank = np.where(at == 0, rank, -1.0)
     order = np.lexsort((-alternating, -rank))[:WORST]
-    return np.asarray(order[at[order] == 0] if np.any(at == 0) else order)
+    return np.asarray(order[at[order] == 0])
 
 
 def _of_parts(question: Question, asked: StressAsked, point: ForcedPoint) -> dict[str, _OfPart]:
@@ -129,7 +131,8 @@ def _of_part(asked: StressAsked, name: str, moved: NodeMotion) -> _OfPart:
     if live:
         harmonics[live] = nodal_stress(solid, whole[live])[:, rows]
         plain[live] = nodal_stress(solid, moved.reduced[live])[:, rows]
-    error = stress_error(solid, whole[live[:1]]).local[0, rows] if live else np.zeros(rows.size)
+    largest = max(live, key=lambda h: float(np.abs(harmonics[h]).max()), default=0)
+    error = stress_error(solid, whole[largest : largest + 1]).local[0, rows] if live else np.zeros(rows.size)
     first = np.searchsorted(places.node[rows], mesh.surface)
     return _OfPart(
         node=places.node[rows],

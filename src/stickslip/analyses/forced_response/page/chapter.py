@@ -41,6 +41,7 @@ from stickslip.analyses.forced_response.page.stress import (
     stress_card,
     stress_cycle,
     stress_surface,
+    stressed_case,
     worst_places,
 )
 from stickslip.analyses.forced_response.page.wheel import (
@@ -343,7 +344,7 @@ SECTION: Section = Section(
     (
         Block("response", "Forced response", (frequency_response, of_each_order)),
         Block("optimisation", "Optimisation curves", (optimisation, where_friction_works, what_is_needed)),
-        Block("stress", "Stress and margin", (chosen_case, stress_surface, haigh, worst_places, stress_cycle)),
+        Block("stress", "Stress and margin", (stressed_case, stress_surface, haigh, worst_places, stress_cycle)),
         Block("wheel", "Blades of the wheel", (blades, peaks_of_blades, wheel_at_peak, wheel_in_motion, statistics)),
         Block(
             "contact",

@@ -3,6 +3,7 @@
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.analyses.forced_response.page.at_peak.contacts import chosen_case
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import STRESS_AT, SurfaceStress, holds, read
 from stickslip.analyses.forced_response.verdicts.margin import Place, places_of, size_of, worst_of
@@ -12,7 +13,7 @@ from stickslip.model.strength import history, von_mises
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, legend_above, styled
 from stickslip.report.quantities import aligned, number, percent
-from stickslip.report.section import Card, Table
+from stickslip.report.section import Card, Chooser, Table
 
 MPA = 1e6
 MM = 1e3
@@ -33,17 +34,24 @@ def _known(response: Response) -> dict[ShownCase, SurfaceStress]:
     return {case: own for case, own in each.items() if own is not None}
 
 
+def stressed_case(response: Response) -> Chooser | None:
+    """Return the buttons that choose the case of the figures below; None without stress."""
+    return chosen_case(response) if _known(response) else None
+
+
 def stress_card(response: Response) -> Card | None:
     """Return the utilisation of the worst place: of the only case, or the smallest over all cases; None without stress."""
     worst = {case: place for case, own in _known(response).items() if (place := worst_of(own)) is not None}
     if not worst:
         return None
-    case = min(worst, key=lambda c: (not np.isfinite(worst[c].utilisation), worst[c].utilisation))
+    case = min(worst, key=lambda c: (np.isnan(worst[c].utilisation), worst[c].utilisation))
     place = worst[case]
     doubt = f", {response.level(case)}" if response.trust(case) else ""
     told = f"{place.name}{case.where}: {size_of(place.alternating)} alternating, {size_of(place.mean)} mean{doubt}"
-    if not np.isfinite(place.utilisation):
-        return Card("Void", "margin: the static stress is above yield", told, danger=True)
+    if np.isnan(place.utilisation):
+        return Card("Void", "margin: the stress is above yield", told, danger=True)
+    if np.isinf(place.utilisation):
+        return Card("Nothing endured", "the mean stress is beyond the static limit", told, danger=True)
     of = "smallest utilisation of the fatigue limit" if len(worst) > 1 else "utilisation of the fatigue limit"
     return Card(number(place.utilisation, 3), of, told, danger=place.utilisation >= 1.0)
 
@@ -145,8 +153,8 @@ def _margin_words(own: SurfaceStress) -> str:
     place = worst_of(own)
     if place is None:
         return ""
-    if not np.isfinite(place.utilisation):
-        return f"{place.name}: the static stress is above yield, there is no margin."
+    if np.isnan(place.utilisation):
+        return f"{place.name}: the stress is above yield, there is no margin."
     return f"{place.name}: factor {number(1 / place.utilisation, 3)} to the line."
 
 

@@ -626,7 +626,7 @@ class SurfaceStress:
     )
     mean_stress: FloatArray = column(
         "Pa",
-        "equivalent stress of the static state, with the sign of its largest principal stress",
+        "equivalent stress of the static state, with the sign of its largest principal stress; where asked for, after shakedown",
         along="case stress_place",
     )
     allowed_stress: FloatArray = column(
@@ -651,6 +651,8 @@ class SurfaceStress:
     worst_stress: FloatArray = column(
         "Pa", "their stress xx, yy, zz, xy, yz, xz in each harmonic", along="case stress_harmonic worst component part"
     )
+    stress_doubt: str = column("1", "what the margin leaves open, empty if nothing", along="case")
+    stress_shakes: int = column("1", "1 if the mean stress is bounded by shakedown", along="case")
     fatigue_limit: float = column("Pa", "amplitude endured at R = -1", along="case")
     haigh_mean: FloatArray = column("Pa", "mean stress of the Haigh diagram", along="case haigh")
     haigh_amplitude: FloatArray = column("Pa", "amplitude endured at that mean stress", along="case haigh")

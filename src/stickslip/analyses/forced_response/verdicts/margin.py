@@ -28,28 +28,26 @@ class Place:
     utilisation: float
     mesh_error: float
     correction: float
+    shakes: bool = False
 
 
 def places_of(own: SurfaceStress, at: IntArray) -> list[Place]:
     """Return places by their indices; negative ones are padding."""
-    return [
-        Place(
-            f"node {int(own.stress_node[k])} of {own.stress_part[k]}",
-            ", ".join(f"{1e3 * v:.2f}" for v in own.stress_point[k]),
-            *(
-                float(values[k])
-                for values in (
-                    own.alternating_stress,
-                    own.mean_stress,
-                    own.allowed_stress,
-                    own.utilisation,
-                    own.stress_mesh_error,
-                    own.stress_correction,
-                )
-            ),
-        )
-        for k in at[at >= 0]
-    ]
+    columns = (
+        own.alternating_stress,
+        own.mean_stress,
+        own.allowed_stress,
+        own.utilisation,
+        own.stress_mesh_error,
+        own.stress_correction,
+    )
+    found = []
+    for k in at[at >= 0]:
+        where = ", ".join(f"{1e3 * v:.2f}" for v in own.stress_point[k])
+        a, m, allowed, used, error, change = (float(values[k]) for values in columns)
+        name = f"node {int(own.stress_node[k])} of {own.stress_part[k]}"
+        found.append(Place(name, where, a, m, allowed, used, error, change, own.stress_shakes == 1))
+    return found
 
 
 def worst_of(own: SurfaceStress) -> Place | None:
@@ -69,15 +67,20 @@ def margin_to_fatigue(case: Curve) -> Iterator[Finding]:
     own = case.read(SurfaceStress)
     place = worst_of(own)
     if place is None:
+        if np.isfinite(own.alternating_stress).any():
+            why = "no place of a surface is away from contacts, joins, supports and loaded nodes, where elastic stress is singular: there is no margin"
+            yield Finding("doubtful", why, "Give a smaller stress.apart_m, or a finer mesh.")
         return
     here = f"{place.name} ({place.where} mm)"
-    if not np.isfinite(place.utilisation):
-        why = (
-            f"the elastic static stress at {here} is {size_of(abs(place.mean))}, above yield: there is no margin there"
-        )
-        remedy = 'Give stress.above_yield = "shakedown" if the material shakes down, or compute the static state with plasticity.'
-        yield Finding("doubtful", why, remedy)
+    if np.isnan(place.utilisation):
+        yield _void(place, here)
         return
+    if np.isinf(place.utilisation):
+        why = f"the mean stress at {here}, {size_of(place.mean)}, is beyond the static limit: no amplitude is endured"
+        yield Finding("trusted", why, "Lower the static stress, or check the limits in [stress].")
+        return
+    if own.stress_doubt:
+        yield Finding("trusted", str(own.stress_doubt), "Give stress.yield_pa.")
     exceeds = "the fatigue limit is exceeded: " if place.utilisation >= 1.0 else ""
     why = (
         f"{exceeds}utilisation {place.utilisation:.3g} at {here}, alternating {size_of(place.alternating)} of "
@@ -94,6 +97,16 @@ def margin_to_fatigue(case: Curve) -> Iterator[Finding]:
         yield Finding("trusted", why, "Refine the mesh there, and round sharp inner edges.")
 
 
+def _void(place: Place, here: str) -> Finding:
+    """Return the finding on a place without a margin: its static stress is above yield, or its amplitude is."""
+    if place.shakes:
+        why = f"the alternating stress at {here}, {size_of(place.alternating)}, is above yield: the material does not shake down, and there is no margin"
+        return Finding("doubtful", why, "Lower the vibration, or compute with plasticity.")
+    why = f"the elastic static stress at {here} is {size_of(abs(place.mean))}, above yield: there is no margin there"
+    remedy = 'Give stress.above_yield = "shakedown" if the material shakes down, or compute the static state with plasticity.'
+    return Finding("doubtful", why, remedy)
+
+
 def stress_table(data: xr.Dataset, labels: list[str]) -> TextTable:
     """Return the terminal table of utilisations; without rows if the study asks for none."""
     head = ("case", "utilisation", "alternating MPa", "mean MPa", "endured MPa", "worst place", "x, y, z mm")
@@ -102,7 +115,7 @@ def stress_table(data: xr.Dataset, labels: list[str]) -> TextTable:
         for i, label in enumerate(labels):
             place = worst_of(read(SurfaceStress, data, i))
             if place is not None:
-                used = f"{place.utilisation:.3g}" if np.isfinite(place.utilisation) else "void, above yield"
+                used = "void, above yield" if np.isnan(place.utilisation) else f"{place.utilisation:.3g}"
                 sizes = (f"{value / MPA:.4g}" for value in (place.alternating, place.mean, place.allowed))
                 rows.append((label, used, *sizes, place.name, place.where))
     return TextTable("Stress at the peak", head, tuple(rows))

@@ -5,8 +5,8 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from stickslip.arrays import FloatArray
-from stickslip.model.strength import StrengthCard, allowable_amplitude
+from stickslip.model.strength import Margin, StrengthCard, margin
+from stickslip.model.strength.haigh import NO_COMPRESSION
 from stickslip.study.file.quantities import refused_by
 from stickslip.study.file.section import Positive, Section, custom_error
 
@@ -63,13 +63,24 @@ class Stress(Section):
             raise custom_error(
                 "is missing", "Give the fatigue limit at R = -1, or remove the table.", "fatigue_limit_pa"
             )
+        if self.credit_in_compression and self.mean_stress in NO_COMPRESSION:
+            problem = f"is true, and {self.mean_stress} has no branch in compression"
+            raise custom_error(problem, "Leave it out, or choose goodman.", "credit_in_compression")
         if self.fatigue_limit_pa is not None:
             refused_by(StrengthCard, self._judged)
         return self
 
-    def _judged(self) -> FloatArray:
-        """Return an allowed amplitude; the card and the rule refuse what does not fit."""
-        return allowable_amplitude(self.mean_stress, self.card(), np.zeros(1))
+    def _judged(self) -> Margin:
+        """Return a margin without stress; the card and the rule refuse what does not fit."""
+        none = np.zeros(1)
+        return margin(
+            self.mean_stress,
+            self.card(),
+            none,
+            none,
+            above_yield=self.above_yield,
+            credit_in_compression=self.credit_in_compression,
+        )
 
     def card(self) -> StrengthCard:
         """Return the strength of the material."""
