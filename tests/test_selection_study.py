@@ -264,7 +264,7 @@ def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> 
     cost = (
         r"estimate: about \d+ s for the parts, once, then [\d.]+ s to solve this case, at most [\d.]+ (s|min)",
         r"estimate: contacts slip at the resonance \(stuck, a friction force would be [\d.]+ times its limit\)",
-        r"estimate: uncertain are the harmonics: H = 15, at most H = 41 at 10 % of \d+ points",
+        r"estimate: harmonics are uncertain, here H = 15, at most H = 41 at 10 % of \d+ points",
         r"estimate: at most \d+ Newton steps, \d+ unknowns, [\d.]+ GB of memory",
         r"estimate: on top come stability, audits and time integration, of doubted points up to some 120 s a case",
         r"estimate: limits\.work_s is compared with \d+ s",
