@@ -9,6 +9,7 @@ from solid_models import box
 from typer.testing import CliRunner
 
 import stickslip as ss
+from stickslip.analyses.forced_response import stress
 from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.stress import haigh, stress_cycle, stress_surface, worst_places
@@ -18,6 +19,7 @@ from stickslip.errors import InputError
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.study.exchange.motion import expanded
 from stickslip.study.models.study import read_study
 
 LENGTH, SIDE, FORCE, WEIGHT = 0.2, 0.02, 100.0, 50.0
@@ -151,7 +153,7 @@ def test_a_static_stress_above_yield_voids_the_margin(tmp_path: Path) -> None:
     data = result["forced_response"].isel(case=0)
     place = int(data.worst_place.values[0])
     amplitude, mean = data.alternating_stress.values[place], data.mean_stress.values[place]
-    assert int(data.stress_shakes) == 1
+    assert int(data.stress_shakedown) == 1
     assert mean == pytest.approx(80e6 - amplitude, rel=1e-9)
     assert data.utilisation.values[place] == pytest.approx(amplitude / (30e6 * (1 - mean / 100e6)), rel=1e-9)
 
@@ -177,6 +179,28 @@ def test_what_leaves_no_margin_is_told_as_it_is(tmp_path: Path, keys: str, says:
     result = ss.Study.from_file(written(tmp_path, text)).run()
     assert any(says in v.why for v in result.verdicts)
     assert not any("above yield: there is no margin there" in v.why for v in result.verdicts)
+
+
+def test_a_case_without_stress_keeps_its_motion_and_the_stress_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(told: Any, model: Any) -> Any:
+        if "100" in told.label:
+            raise InputError("export", "the outputs differ", "Run it again.")
+        return expanded(told, model)
+
+    monkeypatch.setattr(stress, "expanded", refused)
+    study = written(tmp_path, STUDY + "[vary]\nload.shaker.force_n = [100.0, 50.0]\n")
+    out = CliRunner().invoke(app, ["run", str(study), "--workers", "1"])
+    assert out.exit_code == 0, out.output
+    told = " ".join(out.output.split())
+    assert "the stress at the peak was not computed: the outputs differ" in told.replace("The stress", "the stress")
+    data = ss.Result.from_file(tmp_path / "results")["forced_response"]
+    assert set(data.stress_face_case.values) == {1}
+    assert np.isfinite(data.peak_amplitude.values).all()
+    assert not np.isfinite(data.utilisation.values[0]).any()
+    assert np.isfinite(data.utilisation.values[1]).any()
+    assert (data.worst_place.values[0] < 0).all()
 
 
 @pytest.mark.parametrize(

@@ -98,10 +98,6 @@ class StressKeys(TypedDict, total=False):
     """true fracture strength in Pa, for morrow"""
     walker_exponent: float | None
     """Walker's exponent γ, for walker, up to 1"""
-    fatigue_limit_r0_pa: float | None
-    """stress amplitude, half of the range, in Pa that is endured at R = 0, for sines and dang_van"""
-    torsion_limit_pa: float | None
-    """amplitude of the shear stress in Pa that is endured under alternating torsion, for crossland"""
     mean_stress: Literal["goodman", "gerber", "soderberg", "morrow", "walker"]
     """line of the Haigh diagram from the fatigue limit to the static limit; default 'goodman'"""
     above_yield: Literal["void", "shakedown"]

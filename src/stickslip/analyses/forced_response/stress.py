@@ -14,6 +14,7 @@ from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.full_field import NodeMotion, node_motion
 from stickslip.assembly.model import Model
+from stickslip.errors import InputError
 from stickslip.model.fe.stress import nodal_stress, stress_error, stress_places
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
@@ -38,11 +39,19 @@ class _OfPart:
 
 
 def of_stress(question: Question, response: Response) -> Values:
-    """Return the stress at the peak of a case and its margin; nothing if the study does not ask for it or there is no peak."""
+    """Return the stress at the peak of a case and its margin; nothing if the study does not ask for it.
+
+    A case whose stress cannot be computed has no places, and the reason.
+    """
     asked, top = question.stress, response.top
-    if asked is None or top is None or not top.point.converged:
+    if asked is None:
         return {}
-    each = _of_parts(question, asked, top.point)
+    if top is None or not top.point.converged:
+        return _unknown(asked, "there is no peak whose stress could be computed")
+    try:
+        each = _of_parts(question, asked, top.point)
+    except InputError as error:  # the response is solved: it stays
+        return _unknown(asked, f"the stress at the peak was not computed: {error.problem}")
     harmonics = np.concatenate([own.harmonics for own in each.values()], axis=1)
     alternating, mean = alternating_and_mean(harmonics)
     found = margin(
@@ -76,7 +85,34 @@ def of_stress(question: Question, response: Response) -> Values:
             worst_place=order,
             worst_stress=np.stack([cycle.real, cycle.imag], axis=-1),
             stress_doubt=found.doubt,
-            stress_shakes=int(asked.above_yield == "shakedown"),
+            stress_shakedown=int(asked.above_yield == "shakedown"),
+            fatigue_limit=float(np.max(asked.card.fatigue_limit_pa)),
+            haigh_mean=asked.line[0],
+            haigh_amplitude=asked.line[1],
+        )
+    )
+
+
+def _unknown(asked: StressAsked, why: str) -> Values:
+    """Return the variables of a case without stress, which other cases may have."""
+    none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
+    return stored(
+        SurfaceStress(
+            stress_point=np.zeros((0, 3)),
+            stress_node=whole,
+            stress_part=texts(()),
+            stress_triangle=np.zeros((0, 3), dtype=np.int64),
+            stress_at=whole,
+            alternating_stress=none,
+            mean_stress=none,
+            allowed_stress=none,
+            utilisation=none,
+            stress_mesh_error=none,
+            stress_correction=none,
+            worst_place=whole,
+            worst_stress=np.zeros((0, 0, 6, 2)),
+            stress_doubt=why,
+            stress_shakedown=int(asked.above_yield == "shakedown"),
             fatigue_limit=float(np.max(asked.card.fatigue_limit_pa)),
             haigh_mean=asked.line[0],
             haigh_amplitude=asked.line[1],
@@ -152,7 +188,7 @@ def _mesh(part: Part) -> SolidMesh:
 def _codes(asked: StressAsked, name: str, mesh: SolidMesh) -> IntArray:
     """Return (nodes,) codes by `STRESS_AT`: what makes the elastic stress at a node singular."""
     found = np.zeros(len(mesh.points), dtype=np.int64)
-    marked = singular_nodes(asked.model, name)
+    marked = _singular_nodes(asked.model, name)
     for code in range(len(STRESS_AT) - 1, 0, -1):  # contacts are told before joints, supports and loads
         found[_around(mesh, marked[STRESS_AT[code]], asked.apart)] = code
     return found
@@ -172,7 +208,7 @@ def _around(mesh: SolidMesh, marked: BoolArray, apart: float | None) -> BoolArra
     return near
 
 
-def singular_nodes(model: Model, name: str) -> Mapping[str, BoolArray]:
+def _singular_nodes(model: Model, name: str) -> Mapping[str, BoolArray]:
     """Return masks (nodes,) of the nodes of a part at contacts, joints, supports and point loads."""
     part, pairs, ties = model.parts[name], model.pairs, model.ties
     assert part.solid is not None

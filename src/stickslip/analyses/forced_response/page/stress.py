@@ -19,6 +19,7 @@ MPA = 1e6
 MM = 1e3
 SAMPLES = 128  # of the cycle of the worst place
 SHOWN = 3  # cycles in the figure
+DRAWN = 0.02  # of the largest alternating stress, from which a node is in the Haigh diagram
 _SCALE = [[0.0, "#f2f5f9"], [0.5, "#56b4e9"], [0.8, "#e69f00"], [1.0, "#d55e00"]]
 
 
@@ -58,15 +59,14 @@ def stress_card(response: Response) -> Card | None:
 
 def stress_surface(response: Response) -> Plot | None:
     """Draw the utilisation on the surfaces of the parts."""
-    known = _known(response)
-    triangles = response.values("stress_triangle").astype(np.int64) if known else np.zeros((0, 3), dtype=np.int64)
-    if not len(triangles):
+    known = {case: own for case, own in _known(response).items() if own.stress_triangle is not None}
+    if not known:
         return None
     figure, captions = go.Figure(), {}
     top = max(float(np.nanmax(_free(own), initial=0.0)) for own in known.values())
     for case, own in known.items():
         shown = np.where(np.isfinite(own.utilisation), own.utilisation, top)
-        figure.add_trace(_coloured(own, triangles, shown, top, case))
+        figure.add_trace(_coloured(own, shown, top, case))
         places = places_of(own, own.worst_place)
         figure.add_trace(_marks(own, places, case))
         captions[case.index] = _caption(own, places)
@@ -83,8 +83,9 @@ def _free(own: SurfaceStress) -> FloatArray:
     return np.asarray(own.utilisation[(own.stress_at == 0) & np.isfinite(own.utilisation)])
 
 
-def _coloured(own: SurfaceStress, triangles: np.ndarray, shown: FloatArray, top: float, case: ShownCase) -> go.Mesh3d:
-    drawn = surface(own.stress_point * MM, triangles, name="utilisation", meta=case.index)
+def _coloured(own: SurfaceStress, shown: FloatArray, top: float, case: ShownCase) -> go.Mesh3d:
+    assert own.stress_triangle is not None
+    drawn = surface(own.stress_point * MM, own.stress_triangle, name="utilisation", meta=case.index)
     bar = {"title": {"text": "utilisation"}, "thickness": 14, "len": 0.75}
     return drawn.update(
         intensity=shown.astype(np.float32),
@@ -115,7 +116,7 @@ def _caption(own: SurfaceStress, places: list[Place]) -> str:
         for kind in kinds
     )
     singular = f" Listed apart, as elastic stress is singular there: up to {apart} (alternating)." if apart else ""
-    return f"Worst: {first.name}, {first.where}, utilisation {number(first.utilisation, 3)}.{singular}"
+    return f"Worst: {first.name} ({first.where} mm), utilisation {number(first.utilisation, 3)}.{singular}"
 
 
 def haigh(response: Response) -> Plot | None:
@@ -132,7 +133,7 @@ def haigh(response: Response) -> Plot | None:
             (False, "contact, joint, support, load", MUTED, 3),
             (True, "other nodes", "#0072b2", 4),
         ):
-            at = ((own.stress_at == 0) == free) & (own.alternating_stress > 0.02 * np.nanmax(own.alternating_stress))
+            at = ((own.stress_at == 0) == free) & (own.alternating_stress > DRAWN * np.nanmax(own.alternating_stress))
             dot = {"color": colour, "size": size}
             x, y = own.mean_stress[at] / MPA, own.alternating_stress[at] / MPA
             figure.add_trace(go.Scattergl(x=x, y=y, mode="markers", marker=dot, name=name, meta=case.index))
@@ -154,8 +155,8 @@ def _margin_words(own: SurfaceStress) -> str:
     if place is None:
         return ""
     if np.isnan(place.utilisation):
-        return f"{place.name}: the stress is above yield, there is no margin."
-    return f"{place.name}: factor {number(1 / place.utilisation, 3)} to the line."
+        return f"Worst: {place.name}. Its stress is above yield, there is no margin."
+    return f"Worst: {place.name}, factor {number(1 / place.utilisation, 3)} to the line."
 
 
 def worst_places(response: Response) -> Table | None:

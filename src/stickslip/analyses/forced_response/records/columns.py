@@ -615,6 +615,7 @@ class SurfaceStress:
     stress_point: FloatArray = column("m", "nodes of the surfaces", along="case stress_place xyz")
     stress_node: IntArray = column("1", "their numbers in the mesh", along="case stress_place")
     stress_part: TextArray = column("1", "their parts", along="case stress_place")
+    stress_face_case: IntArray | None = column("1", "case of a triangle", along="stress_face", default=None)
     stress_triangle: IntArray | None = column("1", "triangles between them", along="stress_face corner", default=None)
     stress_at: IntArray = column(
         "1",
@@ -652,7 +653,7 @@ class SurfaceStress:
         "Pa", "their stress xx, yy, zz, xy, yz, xz in each harmonic", along="case stress_harmonic worst component part"
     )
     stress_doubt: str = column("1", "what the margin leaves open, empty if nothing", along="case")
-    stress_shakes: int = column("1", "1 if the mean stress is bounded by shakedown", along="case")
+    stress_shakedown: int = column("1", "1 if the mean stress is bounded by shakedown", along="case")
     fatigue_limit: float = column("Pa", "amplitude endured at R = -1", along="case")
     haigh_mean: FloatArray = column("Pa", "mean stress of the Haigh diagram", along="case haigh")
     haigh_amplitude: FloatArray = column("Pa", "amplitude endured at that mean stress", along="case haigh")

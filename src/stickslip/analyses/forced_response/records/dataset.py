@@ -28,8 +28,13 @@ COUNTED = (
     "stress_harmonic",
     "worst",
 )  # dimensions that may be longer in one case than in another
-AXES = {"direction": ["t", "w", "n"], "tangent": ["t", "w"], "part": ["re", "im"], "xyz": ["x", "y", "z"]}
-AXES["component"] = ["xx", "yy", "zz", "xy", "yz", "xz"]
+AXES = {
+    "direction": ["t", "w", "n"],
+    "tangent": ["t", "w"],
+    "part": ["re", "im"],
+    "xyz": ["x", "y", "z"],
+    "component": ["xx", "yy", "zz", "xy", "yz", "xz"],
+}
 
 
 def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
@@ -90,10 +95,10 @@ def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
     """Return the variables of a case with their dimensions, and the index of the case for each of its rows."""
     peak = int(values["peak_point"])
     values = values | {"peak_point": peak + before if peak >= 0 else peak}
-    for own in OWNERS.values():
-        like = own.removeprefix("point_").replace("case", "frequency_hz")  # a variable with one value a row
-        if like in values:
-            values[own] = np.full(len(values[like]), index)
+    for dim, own in OWNERS.items():
+        rows = [len(values[n]) for n, c in COLUMNS.items() if n in values and n != own and c.along[0] == dim]
+        if rows:
+            values[own] = np.full(rows[0], index)
     data = {
         name: xr.Variable(column.along, _shaped(values[name], column.along))
         for name, column in COLUMNS.items()

@@ -28,7 +28,7 @@ class Place:
     utilisation: float
     mesh_error: float
     correction: float
-    shakes: bool = False
+    shakedown: bool = False
 
 
 def places_of(own: SurfaceStress, at: IntArray) -> list[Place]:
@@ -46,7 +46,7 @@ def places_of(own: SurfaceStress, at: IntArray) -> list[Place]:
         where = ", ".join(f"{1e3 * v:.2f}" for v in own.stress_point[k])
         a, m, allowed, used, error, change = (float(values[k]) for values in columns)
         name = f"node {int(own.stress_node[k])} of {own.stress_part[k]}"
-        found.append(Place(name, where, a, m, allowed, used, error, change, own.stress_shakes == 1))
+        found.append(Place(name, where, a, m, allowed, used, error, change, own.stress_shakedown == 1))
     return found
 
 
@@ -70,6 +70,8 @@ def margin_to_fatigue(case: Curve) -> Iterator[Finding]:
         if np.isfinite(own.alternating_stress).any():
             why = "no place of a surface is away from contacts, joins, supports and loaded nodes, where elastic stress is singular: there is no margin"
             yield Finding("doubtful", why, "Give a smaller stress.apart_m, or a finer mesh.")
+        elif own.stress_doubt:
+            yield Finding("doubtful", str(own.stress_doubt), "The motion and its own verdicts stand without it.")
         return
     here = f"{place.name} ({place.where} mm)"
     if np.isnan(place.utilisation):
@@ -99,7 +101,7 @@ def margin_to_fatigue(case: Curve) -> Iterator[Finding]:
 
 def _void(place: Place, here: str) -> Finding:
     """Return the finding on a place without a margin: its static stress is above yield, or its amplitude is."""
-    if place.shakes:
+    if place.shakedown:
         why = f"the alternating stress at {here}, {size_of(place.alternating)}, is above yield: the material does not shake down, and there is no margin"
         return Finding("doubtful", why, "Lower the vibration, or compute with plasticity.")
     why = f"the elastic static stress at {here} is {size_of(abs(place.mean))}, above yield: there is no margin there"

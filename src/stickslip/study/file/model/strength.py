@@ -12,8 +12,6 @@ from stickslip.study.file.section import Positive, Section, custom_error
 
 LIMITS = (
     "fatigue_limit_pa",
-    "fatigue_limit_r0_pa",
-    "torsion_limit_pa",
     "ultimate_pa",
     "yield_pa",
     "fracture_pa",
@@ -35,12 +33,6 @@ class Stress(Section):
     )
     fracture_pa: Positive | None = Field(None, description="true fracture strength in Pa, for morrow")
     walker_exponent: Positive | None = Field(None, le=1, description="Walker's exponent γ, for walker, up to 1")
-    fatigue_limit_r0_pa: Positive | None = Field(
-        None, description="stress amplitude, half of the range, in Pa that is endured at R = 0, for sines and dang_van"
-    )
-    torsion_limit_pa: Positive | None = Field(
-        None, description="amplitude of the shear stress in Pa that is endured under alternating torsion, for crossland"
-    )
     mean_stress: MeanStress = Field(
         "goodman", description="line of the Haigh diagram from the fatigue limit to the static limit"
     )
