@@ -241,12 +241,13 @@ def test_rows_of_cases_follow_each_other_and_say_whose_they_are(monkeypatch: pyt
     monkeypatch.setattr(dataset, "with_levels", lambda *_: {})
     told = {"points": 2, "peak_point": 1, "attributes": "{}", "choice_sentence": "at 5 Hz", "points_failed": 1}
     one = told | {name: np.array([1.0, 2.0]) for name in COLUMNS if name.endswith("frequency_hz") and name not in ONCE}
+    one["stress_triangle"] = np.array([[0, 1, 2], [1, 2, 3]])  # rows without a frequency
     data = dataset.put_together([one, one | {"peak_point": -1}], ["first", "second"])
     owners = {owner: data[owner].values for owner in OWNERS.values()}
     each = [0, 0, 1, 1]
     check(owners, point_case=each, another_case=each, attempt_case=each, alert_case=each, bifurcation_case=each)
     check(owners, verify_case=each, stability_case=each, not_periodic_case=each, tuned_case=each)
-    check(owners, side_branch_case=each, side_point_case=each)
+    check(owners, side_branch_case=each, side_point_case=each, stress_face_case=each)
     check({name: data[name].values for name in told if name in data}, peak_point=[1, -1], points=[2, 2])
     assert data["choice_sentence"].values.tolist() == ["at 5 Hz", "at 5 Hz"]
     assert data.attrs["failed"] == 2
