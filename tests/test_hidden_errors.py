@@ -21,7 +21,8 @@ def said(folder: Path, *changes: tuple[str, str]) -> list[str]:
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)
-    path = folder / "study.toml"
+    path = folder / "tmp.b.m9" / "study.toml"  # names of the folder are no names of the study
+    path.parent.mkdir()
     path.write_text(text)
     with pytest.raises(InputError) as caught:
         read_study(path)

@@ -20,6 +20,7 @@ from stickslip.study.own_code import OwnCode
 MAX_ROUNDS = 5  # of removing wrong keys and checking again
 VARY = "vary"
 MEANT = re.compile(r"Did you mean '([^']+)'")
+PATH = re.compile(r"\S*[/\\]\S*")  # a name of a file in a message
 
 
 @dataclass
@@ -90,8 +91,8 @@ class _Rest:
 
     def speaks_of_removed(self, error: InputError) -> bool:
         """Return whether an error names a removed table."""
-        told = str(error)
-        return any(f"'{name}'" in told or f"{name}." in told or f".{name}" in told for name in self.names)
+        told = PATH.sub("", str(error))
+        return any(re.search(rf"'{name}'|\b{name}\.\w|\w\.{name}\b", told) for name in map(re.escape, self.names))
 
 
 def checked_file(path: Path, *, allow_code: bool = False) -> StudyFile:
