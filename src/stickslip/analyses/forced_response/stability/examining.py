@@ -76,6 +76,8 @@ def examined_points(question: Question, response: Response, examine: Examine) ->
     elif question.examine != "peak":
         search.along()
     search.settle_peak()
+    if question.examine != "peak":
+        search.close_gaps()
     return search.all_points()
 
 
@@ -160,6 +162,17 @@ class _Search:
             if position < 0 or known or (further >= FEW and self.spent > self.allowed):
                 return
             self.look(self.course.order.index(position))
+
+    def close_gaps(self) -> None:
+        """Examine points that the sign of the determinant decided during the search, and does not with all that was found since."""
+        while self.spent <= self.allowed:
+            known = {e.position for e in self.all_points()}
+            open_ = [k for k, position in enumerate(self.course.order) if position not in known]
+            if not open_:
+                return
+            for place in open_:
+                if self.spent <= self.allowed:
+                    self.look(place)
 
     def all_points(self) -> list[Examined]:
         """Return the stability of every point: examined, inferred between two points, by the sign of the determinant, or unknown."""
