@@ -204,6 +204,9 @@ def as_stored(data: xr.Dataset) -> xr.Dataset:
     """Return a dataset as stored: without coordinates of cases and varied keys; other coordinates are variables again."""
     made = [name for name in data.coords if name in (CASE, POINT) or VARIED_KEY in data[name].attrs]
     data = data.drop_vars(made)
+    labels = [name for name in data.coords if name in data.xindexes and name not in data.dims]
+    rows = {data[name].dims[0] for name in labels}  # numbered by `_with_labels`
+    data = data.drop_indexes([*labels, *rows]).drop_vars(rows)
     return data.reset_coords([name for name in data.coords if name not in data.dims])
 
 
