@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,12 @@ from test_clear_answers import LOAD, free_dofs, sweep, system
 from test_readers_deck import CUBE, deck_of
 
 import stickslip as ss
+from stickslip.analyses.resonance.problem import question_of
 from stickslip.api.export import Wanted
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.assembly.forces import Load
+from stickslip.assembly.joints.pairs import refuse_itself
 from stickslip.assembly.sides.mistuning import BladeMistuning, ContactMistuning
 from stickslip.contact.laws.bouc_wen import BoucWen
 from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
@@ -29,6 +32,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.matrices import real_symmetric
 from stickslip.harmonic.selection.goal_oriented import GoalOriented
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
+from stickslip.harmonic.selection.strategy import check_strategy
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.axis import Axis
 from stickslip.model.damping import modal_damping
@@ -47,20 +51,31 @@ from stickslip.model.mesh.sector import Platform, Shroud
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.npz import read_npz, write_npz
 from stickslip.model.part import BodyPoints
+from stickslip.model.readers import measured_columns
+from stickslip.model.readers.ansys_equations import _couplings
+from stickslip.model.readers.nastran_bulk import _axes
+from stickslip.model.readers.nastran_bulk import real_symmetric as of_nastran
 from stickslip.model.rigid.dampers import WedgeDamper
 from stickslip.model.structure import Structure
 from stickslip.model.structure_file import load_structure, save_structure
 from stickslip.reduction import InfluenceCoefficients
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.coupled_stages import Flange, multistage
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.report.paper.figure import write_figure
+from stickslip.report.paper.figure import draw, inches, write_figure
 from stickslip.response.all_motions.found import MotionSearch
 from stickslip.response.bifurcations.locate import bifurcations
 from stickslip.response.forced.response import forced_problem
-from stickslip.response.residual_tractions.bounds import traction_bounds
+from stickslip.response.nonlinear_modes.sdof_oscillator import modal_oscillator
+from stickslip.response.residual_tractions.bounds import resonance_bounds, traction_bounds
+from stickslip.response.resonances.first import first_peaks
 from stickslip.response.rotating.campbell import campbell
 from stickslip.response.rotating.safe import safe
 from stickslip.response.time.transient import TimeStepping, check_outputs
+from stickslip.study.models.checks import stage_refusals
+from stickslip.study.models.cost import above
+from stickslip.study.models.spares import _own_refusals
 from stickslip.study.models.study import read_study
 
 
@@ -86,6 +101,53 @@ STEEL = Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0)
 BEAM = Beam(length=1.0, area=1e-4, second_moment=1e-8, material=STEEL)
 TETRAHEDRON = SolidMesh(np.vstack([np.zeros(3), np.eye(3)]), np.arange(4)[None, :], {"root": np.arange(3)})
 MAP = ss.response.NodalDiameterMap(6, np.arange(4), np.ones((4, 1)), np.ones((4, 1)))
+
+
+LINE = go.Figure(go.Scatter(x=[1.0], y=[1.0]))
+LIMITS: Any = SimpleNamespace(memory_gb=1.0, work_s=10.0)
+
+
+def of_no_kind(thing: Any) -> Any:
+    """Return what has another type than the one that is asked for."""
+    return thing
+
+
+def raised(*found: InputError | None) -> None:
+    for error in filter(None, found):
+        raise error
+
+
+def sparse(values: np.ndarray) -> Any:
+    return scipy.sparse.csr_array(values)
+
+
+def output_system(kind: int, long: float) -> np.ndarray:
+    """Return the rows of a grid in pyYeti's table; its axes are `long`."""
+    rows = np.vstack([np.zeros((3, 3)), long * np.eye(3)])
+    rows[1, 1] = kind
+    return rows
+
+
+def strategy(**more: Any) -> Any:
+    return SimpleNamespace(judge=lambda _: None, verifies=True, **more)
+
+
+def varied(parameter: str) -> Any:
+    return SimpleNamespace(
+        settings=SimpleNamespace(resonance=SimpleNamespace(parameter=parameter)), values={parameter: 1.0}
+    )
+
+
+def side(name: str, *dofs: int) -> Any:
+    return SimpleNamespace(name=name, dofs=np.array(dofs))
+
+
+def spare(by: str, sectors: int) -> Any:
+    """Return the tables of a wheel in one sector of which another part stands, the key of that table, and itself."""
+    parts = {name: SimpleNamespace(sectors=sectors, like=None) for name in ("blade", "disc")}
+    own = SimpleNamespace(part="blade", by=by, sector=2)
+    whole = SimpleNamespace(part="disc")
+    return SimpleNamespace(part=parts, mistuning={"m": own, "w": whole}), "mistuning.m", own
 
 
 def large() -> Structure:
@@ -306,6 +368,109 @@ def two_faces(axis: Axis | None) -> CyclicSector:
             lambda: rotating_solid(TETRAHEDRON, STEEL).at_speed(1.0, tangent="textbok"),
             "RotatingSolid.at_speed: there is no tangent 'textbok'. Did you mean 'textbook'?",
         ),
+        (lambda: Wanted(to=of_no_kind("pdf")), "export: to: is 'pdf'. Give one of vtu, frd, uff."),
+        (lambda: Wanted(to="vtu", steps=0), "export: steps: is 0. Give 1 to 1000 instants."),
+        (lambda: Wanted(to="vtu", steps=1001), "export: steps: is 1001. Give 1 to 1000 instants."),
+        (lambda: rotating_beam(BEAM, 0, 0.0), "rotating_beam: elements: is 0. Give 1 or more."),
+        (
+            lambda: rotating_beam(BEAM, 2, 0.0, bending=of_no_kind("x")),
+            "rotating_beam: bending: is 'x'. Give one of y, z, both.",
+        ),
+        (
+            lambda: rotating_beam(BEAM, 2, 0.0, coriolis=True),
+            "coriolis: acts between deflection and stretching, and the beam does not stretch. Give axial=True.",
+        ),
+        (
+            lambda: Orientation(of_no_kind(np.diag([2.0, 1.0, 1.0]))),
+            "are no perpendicular unit vectors, got [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]. Give an orthogonal",
+        ),
+        (
+            lambda: Reduction(method=of_no_kind("guyan")),
+            "Reduction.method: is 'guyan'. Give craig_bampton or rubin.",
+        ),
+        (
+            lambda: fit_loops([loop(np.arange(9.0)), (np.zeros(3), np.zeros(4))]),
+            "fit_loops: loops[1]: displacements have the shape (3,), forces (4,). Give two arrays of one length.",
+        ),
+        (
+            lambda: fit_loops([loop(np.arange(7.0))]),
+            "fit_loops: loops[0]: has 7 samples. Give 8 at least, better a hundred a cycle.",
+        ),
+        (lambda: inches("85"), "figure: width: is '85'. Give 20mm to 1000mm, such as 85mm, 8.5cm, 3.35in or 242pt."),
+        (lambda: inches("19mm"), "figure: width: is '19mm'. Give 20mm to 1000mm"),
+        (
+            lambda: draw(go.Figure(), "response", None),
+            "plot('response'): shows nothing. Take another figure: result.plots names them.",
+        ),
+        (
+            lambda: draw(LINE, "response", []),
+            "has 0 pairs of axes. Give one pair of axes, in the order of reading: `plt.subplots` makes them. Or leave",
+        ),
+        (lambda: draw(LINE, "response", "ax"), "holds a str. Give one pair of axes of matplotlib: `figure, ax = plt"),
+        (lambda: of_nastran(sparse(np.ones((2, 3))), "a.op4: KAA"), "a.op4: KAA: is 2 x 3. Give square matrices."),
+        (
+            lambda: of_nastran(sparse(1j * np.eye(2)), "a.op4: KAA"),
+            "KAA: is complex. Structural damping is an operation on the real stiffness here: write it without.",
+        ),
+        (
+            lambda: _axes(output_system(9, 1.0), 7, "a.bdf"),
+            "a.bdf: grid 7 has an output system of kind 9. Use CORD2R, C or S.",
+        ),
+        (
+            lambda: _axes(output_system(1, 2.0), 7, "a.bdf"),
+            "a.bdf: the output system of grid 7 is not orthogonal. Give its axes right angles.",
+        ),
+        (
+            lambda: _couplings(of_no_kind(SimpleNamespace(commands=[("a.cdb: line 3", ["CP", "1"])])), cyclic=False),
+            "a.cdb: line 3: couples 1. Write number, label, nodes.",
+        ),
+        (
+            lambda: own_motions(chain(4, 1.0, 1.0), np.array([0])),
+            "TunedWheel: has forces of constraints among its motions. Put them behind these.",
+        ),
+        (
+            lambda: modal_oscillator(of_no_kind(SimpleNamespace(points=[])), LOAD),
+            "the backbone has 0 points that converged, and 4 are the fewest. Follow it over more amplitudes, or with more",
+        ),
+        (
+            lambda: resonance_bounds(system(), LOAD, [], "most"),
+            "resonance_bounds: known: holds no bounds that converged. Give those of `traction_bounds`.",
+        ),
+        (lambda: first_peaks(of_no_kind(None), math.nan), "values: hold nan. Give finite numbers."),
+        (
+            lambda: check_strategy(strategy()),
+            "SimpleNamespace.threshold: is missing. Give it the indicator above which more harmonics are asked for",
+        ),
+        (lambda: check_strategy(strategy(threshold=None)), "SimpleNamespace.threshold: is None. Give it the indicator"),
+        (lambda: check_strategy(strategy(threshold=math.nan)), "SimpleNamespace.threshold: is nan. Give it the"),
+        (
+            lambda: question_of(of_no_kind(varied("a.b")), of_no_kind(None)),
+            "is a.b, which [vary] varies too: every case would follow the same peaks. Drop it from [vary], or give",
+        ),
+        (
+            lambda: refuse_itself("contact.c.between", side("a", 1), side("a", 2)),
+            "contact.c.between: pairs 'a' with itself, where nothing moves relative to anything. Name the other side",
+        ),
+        (
+            lambda: refuse_itself("contact.c.between", side("a", 1, 2), side("b", 3, 2)),
+            "contact.c.between: pairs a dof that is both in 'a' and in 'b' with itself, where nothing moves",
+        ),
+        (
+            lambda: raised(above(LIMITS, "it would be", 1.01, 10.0)),
+            "limits.memory_gb: it would be at 1.0 GB, the limit is 1 GB. Take a coarser mesh",
+        ),
+        (
+            lambda: raised(above(LIMITS, "it would take", 1.0, 11.0)),
+            "limits.work_s: it would take at 11 s, the limit is 10 s. Take a coarser mesh",
+        ),
+        (
+            lambda: raised(*_own_refusals(*spare("blade", 6))),
+            "mistuning.m.by: is 'blade', the wheel's own part. Name another [part.NAME], which stands in this sector alone.",
+        ),
+        (
+            lambda: raised(*_own_refusals(*spare("disc", 6))),
+            "mistuning.m.by: is 'disc', a part of all sectors. Name another [part.NAME]",
+        ),
         (
             lambda: write_figure(go.Figure(), "response", Path("a.gif"), "1-column"),
             "figure: a.gif: ends with '.gif'. Give one of .pdf",
@@ -406,6 +571,31 @@ FACE = "[part.body.surfaces.face]\npoints_m = [[0.0, 0.0, 0.0]]\n"
             "quasi_periodic.frequencies_hz: must grow. Sort them, and give each once.",
         ),
         (
+            {"vary.load.shaker.force_n": "[]"},
+            "",
+            "vary.load.shaker.force_n: is an empty list: there is nothing to compute. Give one value or more.",
+        ),
+        (
+            {"vary.load.shaker.force_n": "3.0"},
+            "",
+            "vary.load.shaker.force_n: must be a list of values, got 3.0. For example [vary] with",
+        ),
+        (
+            {},
+            "[run_up]\nspeeds_rpm = [100.0, 100.0]\nengine_orders = [2]\n",
+            "run_up.speeds_rpm: begins and ends at 100. Give the lower speed first, then a higher one.",
+        ),
+        (
+            {},
+            "[run_up]\nspeeds_rpm = [100.0, 200.0]\nengine_orders = [2, 2]\n",
+            "run_up.engine_orders: holds an entry twice, got [2, 2]. Give every one once.",
+        ),
+        (
+            {},
+            "[mistuning.m]\nof = 'chain'\ndistribution = 'normal'\nstandard_deviation_m = 0.1\nseed = 1\n",
+            "standard_deviation_m: is 0.1 beside quantity = 'frequency'. Give standard_deviation instead: gaps scatter by",
+        ),
+        (
             {},
             "[quasi_periodic]\nfrequency_hz = [8.0, 9.0]\nharmonics = 5\nmost_harmonics = 3\n",
             "quasi_periodic.most_harmonics: is less than harmonics. Raise it.",
@@ -463,3 +653,28 @@ def test_decks_are_refused_by_line_with_the_remedy(old: str, new: str, said: str
     with pytest.raises(InputError) as told:
         deck_of(tmp_path, CUBE.replace(old, new))
     assert said in str(told.value)
+
+
+def test_stages_are_refused_by_each_key_that_they_do_not_have() -> None:
+    joins = {"a": SimpleNamespace(pairing="spatial_harmonics"), "b": SimpleNamespace(pairing="node_to_node")}
+    tables: Any = SimpleNamespace(join=joins, contact={"c": None}, rotation=SimpleNamespace(speed_rpm=9.0), safe=1)
+    found = [str(error) for error in stage_refusals(tables)]
+    assert [text.partition(". Ask for [modes], at rest and without contacts;")[0] for text in found] == [
+        "safe: is no question for stages, which a join by spatial_harmonics couples",
+        "join.b.pairing: is node_to_node beside joins by spatial_harmonics",
+        "contact.c: touches stages, which a join couples",
+        "rotation.speed_rpm: gives stages a prestress that crosses their flanges",
+    ]
+    still: Any = SimpleNamespace(join={"a": joins["a"]}, contact={}, rotation=SimpleNamespace(speed_rpm=0.0), modes=1)
+    assert list(stage_refusals(still)) == []
+    assert list(stage_refusals(SimpleNamespace(**vars(tables) | {"join": {"b": joins["b"]}}))) == []
+
+
+def test_a_table_of_too_many_lines_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measured_columns, "MAX_ROWS", 3)
+    path = tmp_path / "a.csv"
+    path.write_text("value,amplitude_m\n1,1\n2,2\n", encoding="utf-8")
+    measured_columns.read_columns(path)
+    path.write_text("value,amplitude_m\n1,1\n2,2\n3,3\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"a\.csv: has over 3 lines\. Cut or thin it out\.$"):
+        measured_columns.read_columns(path)

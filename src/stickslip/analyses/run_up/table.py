@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from stickslip.analyses.waves.tables import Order
-from stickslip.study.file.section import Positive, Range, Section, custom_error, once, rising_pair
+from stickslip.study.file.section import Positive, Range, Section, once, rising_pair
 from stickslip.units import RPM
 
 
@@ -48,8 +48,6 @@ class RunUpTable(Section):
         rising_pair(self.speeds_rpm, "speeds_rpm", "speed")
         once(self.engine_orders or [], "engine_orders")
         once(self.rate_rpm_per_s or [], "rate_rpm_per_s")
-        if self.speeds_rpm[0] == self.speeds_rpm[1]:
-            raise custom_error("is one speed", "Give two, or a forced response.", "speeds_rpm")
         return self
 
     @property

@@ -239,10 +239,10 @@ def refuse_itself(place: str, first: Spot, second: Spot) -> None:
     same = first.name == second.name
     met = first.dofs.shape == second.dofs.shape and bool(np.any(first.dofs == second.dofs))
     if same or met:
-        whom = repr(first.name) if same else f"{first.name!r} and {second.name!r}, one dof of which"
+        whom = f"pairs {first.name!r}" if same else f"pairs a dof that is both in {first.name!r} and in {second.name!r}"
         raise input_error(
             place,
-            f"pairs {whom} with itself, where nothing moves relative to anything",
+            f"{whom} with itself, where nothing moves relative to anything",
             'Name the other side, or "ground".',
         )
 

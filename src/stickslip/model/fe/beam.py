@@ -150,8 +150,10 @@ def rotating_beam(
     InputError
         If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are requested without axial motion.
     """
-    if elements < 1 or bending not in get_args(Bending):
-        raise input_error("beam", f"got {elements} elements and bending {bending!r}", "One or more, y, z or both.")
+    if elements < 1:
+        raise input_error("rotating_beam: elements", f"is {elements}", "Give 1 or more.")
+    if bending not in get_args(Bending):
+        raise input_error("rotating_beam: bending", f"is {bending!r}", f"Give one of {', '.join(get_args(Bending))}.")
     if not 0 <= hub_radius < math.inf or not math.isfinite(speed):
         raise input_error("rotating_beam", f"got hub radius {hub_radius} and speed {speed}", "In m and rad/s.")
     if speed and tuple(shape.ends) != ("clamped", "free"):

@@ -410,7 +410,7 @@ def _axes(rows: FloatArray, grid: int, place: str) -> FloatArray:
     """Return the (3, 3) axes, as columns, of a grid's output system, from its six rows of pyYeti's table."""
     kind, system = int(rows[1, 1]), rows[3:]
     if not np.allclose(system @ system.T, np.eye(3), atol=1e-9):
-        raise input_error(place, f"the output system of grid {grid} is not orthogonal", "Check it.")
+        raise input_error(place, f"the output system of grid {grid} is not orthogonal", "Give its axes right angles.")
     if kind == RECTANGULAR:
         return system
     x, y, z = system.T @ (rows[0] - rows[2])

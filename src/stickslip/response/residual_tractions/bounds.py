@@ -266,7 +266,9 @@ def resonance_bounds(
     """
     known = [b for b in known if b.converged]
     if not known:
-        raise input_error("known", "holds no bounds that converged", "Give those of `traction_bounds`.")
+        raise input_error(
+            "resonance_bounds: known", "holds no bounds that converged", "Give those of `traction_bounds`."
+        )
     heights = [getattr(b, end).amplitude for b in known]
     top = int(np.argmax(heights))
     if top in (0, len(known) - 1):
