@@ -225,12 +225,13 @@ def check_in_time(
     """
     point = accepted.point
     after = 0 if multiplier is None else shows_after(multiplier)
+    least = max(1, min(after, PATIENCE))
     found = integrated(
         question.problem,
         point,
         question.model.load,
         kick=0.0 if multiplier is None else KICK,
-        least=max(1, min(after, PATIENCE)),
+        least=least,
     )
     check = _compared(question, response, point, found, STEPS)
     if found.settled and not abs(check.difference_percent) <= LARGE:
@@ -244,7 +245,9 @@ def check_in_time(
             return own, replace(raised, predicted_error=own.outputs_percent / 100)
     known = _driven(question, _known(found)[:, response.output])
     balances = [_of_balance(question, response, point)]
-    if not (abs(check.difference_percent) <= LARGE and _apart(balances[0], known) <= APART):
+    # a check on request explains its difference; one for stability only tells the motions apart
+    explains = multiplier is None and not abs(check.difference_percent) <= LARGE
+    if explains or not _apart(balances[0], known) <= APART:
         order = max(min(max(MORE * point.order, LEAST_HARMONICS), MOST_HARMONICS), point.order + 1)
         check = replace(check, refined_order=order)
         better = refined(question, point, order)
@@ -261,7 +264,7 @@ def check_in_time(
     if motion == "attained" and close:
         # close to the unit circle the error of the steps may decide on which side of it a multiplier lies
         steps = 2 * check.steps
-        finer = integrated(question.problem, point, question.model.load, kick=KICK, least=PATIENCE, steps=steps)
+        finer = integrated(question.problem, point, question.model.load, kick=KICK, least=least, steps=steps)
         fine = _compared(question, response, point, finer, steps)
         if motion_of(fine, finer) != motion:
             check = replace(fine, refined_order=check.refined_order, refined=check.refined)
