@@ -8,16 +8,20 @@ import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.build import linear_side, physical, system_of
+from stickslip.assembly.joints.ties import MEAN
 from stickslip.assembly.locations import AXES, picked
 from stickslip.assembly.model import Model
 from stickslip.assembly.part_reduction import at_speed, steady_load, with_ways_back
 from stickslip.assembly.response_request import asked
 from stickslip.assembly.sides.mistuned import of_all, system_of_all
+from stickslip.assembly.sides.wheel import faces_of
 from stickslip.assembly.skin import mesh_motion
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.model.fe.factorisation import Factorisation, factorise
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.part import Part
 from stickslip.reduction.waves import wave
 from stickslip.response.system import System
 
@@ -200,10 +204,17 @@ class NodeMotion:
         (H+1, nodes, 3) complex coefficients of ``u(t) = Re Σ U_h exp(i h ω t)`` in m, by the reduced model.
     correction
         (H+1, nodes, 3) the static correction: what the modes that the reduction leaves out contribute, quasi-statically.
+    phases
+        (H+1,) factor of each harmonic between a sector and the one before, each in its own axes.
+    faces
+        (p, 2) indices of nodes of the low cyclic face and of their partners on the high one, without those on the axis; None without
+        faces of like meshes.
     """
 
     reduced: ComplexArray
     correction: ComplexArray
+    phases: ComplexArray
+    faces: IntArray | None = None
 
     @property
     def whole(self) -> ComplexArray:
@@ -240,8 +251,20 @@ def node_motion(model: Model, whole: Everywhere, fields: ComplexArray, omega: fl
             continue
         motion, own = mesh_motion(part, part.mesh), model.places.own(name)
         reduced, more = (_at_nodes(motion, field[:, own]) for field in (fields[0], corrected))
-        found[name] = NodeMotion(reduced, more)
+        phases = np.array([whole.phase(h, 1) for h in range(len(reduced))])
+        found[name] = NodeMotion(reduced, more, phases, _paired_nodes(name, part, part.mesh))
     return found
+
+
+def _paired_nodes(name: str, part: Part, mesh: SolidMesh) -> IntArray | None:
+    """Return (p, 2) mesh nodes of both cyclic faces; None without faces, or with meshes that do not match."""
+    sector = faces_of(name, part) if part.sectors > 1 else None
+    if sector is None or sector.axis is None or part.cyclic == MEAN:
+        return None
+    numbers = np.stack([part.structure.dofs.node[own] for own in (sector.low, sector.high)], axis=1)
+    apart = np.unique(numbers[numbers[:, 0] != numbers[:, 1]], axis=0)
+    order = np.argsort(mesh.numbers, kind="stable")
+    return np.asarray(order[np.searchsorted(mesh.numbers, apart, sorter=order)])
 
 
 def _at_nodes(motion: Matrix, field: ComplexArray) -> ComplexArray:

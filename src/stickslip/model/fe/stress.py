@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import scipy
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.cell_laws import CellLaws, laws_of_group
 from stickslip.model.fe.cell_matrices import cell_stiffness, inner_motion, strain_operator
@@ -76,13 +76,63 @@ class StressError:
     whole: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Cells of the neighbouring sectors of a wheel around the nodes of the cyclic faces.
+
+    Parameters
+    ----------
+    nodes
+        (p, 2) indices of nodes of the low face and of their partners on the high face; nodes on the axis are left out.
+    rotation
+        (3, 3) matrix that turns the low face to the high one.
+    phase
+        (f,) factor of each field between a sector and the one before, each in its own axes; None: 1, as of a static field.
+    """
+
+    nodes: IntArray
+    rotation: FloatArray
+    phase: ComplexArray | None = None
+
+    def at(self, phase: ComplexArray) -> "Neighbours":
+        """Return the same with the factors (f,) of fields."""
+        return replace(self, phase=phase)
+
+    def part(self, fields: slice) -> "Neighbours":
+        """Return the same for some of the fields."""
+        return self if self.phase is None else replace(self, phase=self.phase[fields])
+
+    def added(self, own: Matrix, pairs: IntArray) -> Matrix:
+        """Return values (k, 6, f) at places with those of the neighbours added at pairs (m, 2) of places."""
+        low, high = pairs.T
+        phase = np.ones(1) if self.phase is None else self.phase
+        onward, back = _turn(self.rotation), _turn(self.rotation.T)
+        found = own.astype(np.result_type(own, phase))
+        found[high] += phase * np.einsum("ij,kjf->kif", onward, own[low])
+        found[low] += phase.conj() * np.einsum("ij,kjf->kif", back, own[high])
+        return found
+
+
+def _turn(rotation: FloatArray) -> FloatArray:
+    """Return the (6, 6) matrix that turns the components of a stress."""
+    found = np.empty((6, 6))
+    for column, (i, j) in enumerate(PAIRS):
+        unit = np.zeros((3, 3))
+        unit[i, j] = unit[j, i] = 1.0
+        turned = rotation @ unit @ rotation.T
+        found[:, column] = [turned[a, b] for a, b in PAIRS]
+    return found
+
+
 def stress_places(laws: CellLaws) -> StressPlaces:
     """Return the pairs of node and material that cells have."""
     found = np.unique(np.concatenate([np.unique(keys) for keys in _keys(laws, laws.mesh.cells, laws.which)]))
     return StressPlaces(*np.divmod(found, len(laws.each)))
 
 
-def nodal_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bool = False) -> Matrix:
+def nodal_stress(
+    solid: RotatingSolid, displacement: Matrix, *, heated: bool = False, neighbours: Neighbours | None = None
+) -> Matrix:
     """Return the stress at the nodes, extrapolated from the integration points of each cell and averaged over cells of one material.
 
     Within a cell the stress fits the integration points (least squares): with the shape functions of all nodes if there are as many
@@ -97,6 +147,8 @@ def nodal_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bool = F
         (f, nodes, 3) displacement fields in m, real or complex.
     heated
         Whether the thermal strain belongs to the fields, which are static then: it is subtracted from their strain.
+    neighbours
+        Of one sector of a wheel: the cells on the other side of its cyclic faces count as well; None: those of the solid alone.
 
     Returns
     -------
@@ -108,7 +160,10 @@ def nodal_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bool = F
     InputError
         If the displacement has another shape, or is complex and `heated`.
     """
-    blocks = [_averaged(solid, fields, heated) for fields in _real_fields(solid, displacement, heated=heated)]
+    blocks = [
+        _averaged(solid, fields, heated, None if neighbours is None else neighbours.part(some))
+        for some, fields in _real_fields(solid, displacement, heated=heated)
+    ]
     return _as_given(np.concatenate(blocks, axis=2), displacement)
 
 
@@ -122,7 +177,7 @@ def integration_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bo
     solid, displacement, heated
         As in `nodal_stress`.
     """
-    blocks = list(_real_fields(solid, displacement, heated=heated))
+    blocks = [fields for _, fields in _real_fields(solid, displacement, heated=heated)]
     found = []
     for group in solid.cell_groups:
         laws, shape = laws_of_group(solid.laws, group.mesh, group.rows), group.strain
@@ -136,7 +191,9 @@ def integration_stress(solid: RotatingSolid, displacement: Matrix, *, heated: bo
     return found
 
 
-def stress_error(solid: RotatingSolid, displacement: Matrix, *, heated: bool = False) -> StressError:
+def stress_error(
+    solid: RotatingSolid, displacement: Matrix, *, heated: bool = False, neighbours: Neighbours | None = None
+) -> StressError:
     """Estimate the error of the stress from the difference of an averaged stress and that of each cell.
 
     ``‖e‖² = ∫ (σ* − σ)ᵀ C⁻¹ (σ* − σ) dV`` over ``‖σ‖² + ‖e‖²`` (Zienkiewicz and Zhu 1987). σ* is averaged as in `nodal_stress`; in cells
@@ -145,13 +202,14 @@ def stress_error(solid: RotatingSolid, displacement: Matrix, *, heated: bool = F
 
     Parameters
     ----------
-    solid, displacement, heated
-        As in `nodal_stress`.
+    solid, displacement, heated, neighbours
+        As in `nodal_stress`; the error in the cells of the neighbours is not added.
     """
     places = stress_places(solid.laws)
     local, whole = [], []
-    for fields in _real_fields(solid, displacement, heated=heated):
-        averaged = _averaged(solid, fields, heated, exact=True)
+    for some, fields in _real_fields(solid, displacement, heated=heated):
+        beside = None if neighbours is None else neighbours.part(some)
+        averaged = _averaged(solid, fields, heated, beside, exact=True)
         around, total = np.zeros((2, len(places.node), fields.shape[2])), np.zeros((2, fields.shape[2]))
         for group, laws, piece, stress in _cells(solid, fields, heated, exact=True):
             place = _places_of(solid.laws, places, group, piece)
@@ -198,7 +256,9 @@ def _squares(
     return error, of_stress
 
 
-def _averaged(solid: RotatingSolid, fields: FloatArray, heated: bool, *, exact: bool = False) -> FloatArray:
+def _averaged(
+    solid: RotatingSolid, fields: FloatArray, heated: bool, beside: Neighbours | None, *, exact: bool = False
+) -> FloatArray:
     """Return the averaged stress (k, 6, real fields) at `stress_places`."""
     places = stress_places(solid.laws)
     total = np.zeros((len(places.node), 6, fields.shape[2]))
@@ -207,8 +267,25 @@ def _averaged(solid: RotatingSolid, fields: FloatArray, heated: bool, *, exact: 
         place = _places_of(solid.laws, places, group, piece)
         _add(total, place, stress)
         _add(counts, place, np.ones(place.shape))
+    if beside is not None:
+        pairs = _pairs(solid.laws, places, beside.nodes)
+        complex_ = beside.phase is not None
+        whole = beside.added(total.view(np.complex128) if complex_ else total, pairs)
+        total = np.ascontiguousarray(whole).view(np.float64)
+        low, high = pairs.T
+        both = counts[low] + counts[high]
+        counts[low] = counts[high] = both
     total /= counts[:, None, None]
     return total
+
+
+def _pairs(laws: CellLaws, places: StressPlaces, nodes: IntArray) -> IntArray:
+    """Return the pairs (m, 2) of places of paired nodes (p, 2) that cells of the same material have."""
+    numbers = places.node * len(laws.each) + places.material
+    keys = (nodes[:, None] * len(laws.each) + np.arange(len(laws.each))[None, :, None]).reshape(-1, 2)
+    found = np.minimum(np.searchsorted(numbers, keys), len(numbers) - 1)
+    there: BoolArray = (numbers[found] == keys).all(axis=1)
+    return np.asarray(found[there])
 
 
 def _cells(
@@ -269,8 +346,8 @@ def _extrapolation(width: int, rule: Quadrature) -> FloatArray:
     return np.vstack([onto, onto[np.array(EDGES[corners])].mean(axis=1)])
 
 
-def _real_fields(solid: RotatingSolid, displacement: Matrix, *, heated: bool) -> Iterator[FloatArray]:
-    """Yield (nodes, 3, at most `FIELDS`) real fields; a complex field is two of them, one behind the other."""
+def _real_fields(solid: RotatingSolid, displacement: Matrix, *, heated: bool) -> Iterator[tuple[slice, FloatArray]]:
+    """Yield the place and (nodes, 3, at most `FIELDS`) real fields of some fields; a complex one is two, one behind the other."""
     n = len(solid.mesh.points)
     if displacement.ndim != 3 or displacement.shape[1:] != (n, 3):
         raise input_error(
@@ -286,9 +363,10 @@ def _real_fields(solid: RotatingSolid, displacement: Matrix, *, heated: bool) ->
         )
     each = 2 if np.iscomplexobj(displacement) else 1
     for first in range(0, max(1, len(displacement)), FIELDS // each):
-        block = np.moveaxis(displacement[first : first + FIELDS // each], 0, 2)
+        some = slice(first, first + FIELDS // each)
+        block = np.moveaxis(displacement[some], 0, 2)
         kind = np.complex128 if each == 2 else np.float64
-        yield np.ascontiguousarray(block, dtype=kind).view(np.float64)
+        yield some, np.ascontiguousarray(block, dtype=kind).view(np.float64)
 
 
 def _as_given(values: FloatArray, displacement: Matrix) -> FloatArray:
