@@ -10,6 +10,7 @@ import stickslip
 from stickslip.api.model import OF_THE_MODEL
 from stickslip.study.analysis import named
 from stickslip.study.file.harmonics import Selection
+from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.questions import ANALYSES
 
@@ -21,7 +22,7 @@ HEAD = '''
 Editors complete them, and type checkers compare names, types and required keys.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, Required, TypedDict
 
 from stickslip.arrays import FloatArray, IntArray
@@ -89,8 +90,12 @@ def _types(kind: Any) -> Iterator[str]:
         entry = " | ".join(dict.fromkeys(_types(inner[0])))
         yield f"Sequence[{entry}]"
         yield from (ARRAYS[one] for one in ARRAYS if one.__name__ == entry)
+    elif origin is dict:
+        yield f"Mapping[str, {' | '.join(dict.fromkeys(_types(inner[1])))}]"
     elif kind is NoneType:
         yield "None"
+    elif issubclass(kind, Section):
+        yield "Mapping[str, object]"
     else:
         yield kind.__name__
 

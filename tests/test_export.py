@@ -413,10 +413,10 @@ def test_what_pages_draw_of_copies_moves_as_the_unreduced_model_says(beams):
     _, result, model = beams
     data = result["forced_response"]
     wanted = solved(model, float(data["frequency_hz"].values[int(data["peak_point"].values[0])]))
-    found, kinds = drawn(data, "peak_drawn_motion"), set(data["drawn_kind"].values.tolist())
+    found, kinds = drawn(data, "peak_drawn_motion"), set(data["drawn_kind"].values[0].tolist())
     assert kinds == {"mesh"}
     for nodes in nodes_of(model):
-        mine = data["drawn_part"].values == nodes.part
+        mine = data["drawn_part"].values[0] == nodes.part
         off, at = KDTree(nodes.points).query(data["drawn_point"].values[0, mine])
         assert off.max() < 1e-12
         assert np.abs(found[mine] - nodes.of(wanted)[at]).max() < 1e-5 * np.abs(wanted).max()  # single precision

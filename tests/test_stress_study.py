@@ -1,6 +1,7 @@
 """Stress and margin of a study: a cantilever against beam theory, verdicts and page, and what is refused."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,18 +10,23 @@ from solid_models import box
 from typer.testing import CliRunner
 
 import stickslip as ss
-from stickslip.analyses.forced_response import stress
+from stickslip.analyses.forced_response import analysis, stress
 from stickslip.analyses.forced_response.page.chapter import cards
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.page.stress import haigh, stress_cycle, stress_surface, worst_places
-from stickslip.analyses.forced_response.records.columns import STRESS_AT
+from stickslip.analyses.forced_response.records.columns import STRESS_AT, Drawn, SurfaceStress, read
+from stickslip.analyses.forced_response.stress import with_margin
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.strength import StrengthCard, cycle
+from stickslip.model.strength.cycle import CRITERIA, worst_utilisation
 from stickslip.study.exchange.motion import expanded
+from stickslip.study.file.model.strength import Stress
 from stickslip.study.models.study import read_study
+from stickslip.study.store.journal import read_note
 
 LENGTH, SIDE, FORCE, WEIGHT = 0.2, 0.02, 100.0, 50.0
 STUDY = """
@@ -96,6 +102,7 @@ def test_stress_and_margin_are_those_of_beam_theory(cantilever: Any) -> None:
     assert beside.sum() == 18
     assert data.alternating_stress.values[beside] == pytest.approx(FORCE * bending, rel=0.02)
     assert np.abs(data.mean_stress.values[beside]) == pytest.approx(WEIGHT * bending, rel=0.02)
+    assert np.abs(data.static_stress.values[beside, 0]) == pytest.approx(WEIGHT * bending, rel=0.02)
     above = beside & (z > z.mean())
     assert len(set(np.sign(data.mean_stress.values[above]))) == 1  # tension on one side, compression on the other
     # the worst place stands one element from the clamp, in tension: Goodman's line by hand
@@ -158,6 +165,229 @@ def test_a_static_stress_above_yield_voids_the_margin(tmp_path: Path) -> None:
     assert data.utilisation.values[place] == pytest.approx(amplitude / (30e6 * (1 - mean / 100e6)), rel=1e-9)
 
 
+def test_a_changed_card_takes_the_stored_stress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def solves(question: Any, done: Any) -> Any:
+        raise AssertionError("the response is computed anew")
+
+    def run(text: str) -> tuple[str, Any]:
+        out = CliRunner().invoke(app, ["run", str(written(tmp_path, text)), "--workers", "1"])
+        assert out.exit_code == 0, out.output
+        log = (tmp_path / "results" / "run.log").read_text(encoding="utf-8")
+        return log.rpartition("jobs to do: ")[2], ss.Result.from_file(tmp_path / "results")["forced_response"]
+
+    _, before = run(STUDY.partition("[stress]")[0])
+    assert "utilisation" not in before
+    monkeypatch.setattr(analysis, "_solved", solves)
+    told, first = run(STUDY)  # the stress is computed from the stored motion
+    assert told.startswith("1,")
+    told, second = run(STUDY.replace("30e6", "60e6") + 'mean_stress = "gerber"\napart_m = 0.041\n')
+    assert told.startswith("0,")
+    place, here = int(first.worst_place.values[0, 0]), int(second.worst_place.values[0, 0])
+    amplitude, mean = second.alternating_stress.values[0, here], second.mean_stress.values[0, here]
+    assert second.utilisation.values[0, here] == pytest.approx(
+        amplitude / (60e6 * (1 - (mean / 100e6) ** 2)), rel=1e-12
+    )
+    assert second.stress_point.values[0, here, 0] > 0.041 >= first.stress_point.values[0, place, 0]
+    told, varied = run(STUDY + "[vary]\nstress.fatigue_limit_pa = [30e6, 60e6]\n")
+    assert told.startswith("0,")
+    assert varied.utilisation.values[0] == pytest.approx(first.utilisation.values[0], nan_ok=True, rel=1e-12)
+    assert varied.utilisation.values[1] == pytest.approx(0.5 * first.utilisation.values[0], nan_ok=True, rel=1e-12)
+    _, gone = run(STUDY.partition("[stress]")[0])
+    assert "utilisation" not in gone
+
+
+@pytest.fixture(scope="module")
+def stored_stress(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The note of a run, and a function that judges it by a table [stress]."""
+    folder = tmp_path_factory.mktemp("note")
+    result = ss.Study.from_file(written(folder)).run()
+    (job,) = (folder / "results" / "jobs").glob("*.job")
+    note, peak = read_note(job, "stress"), float(result["forced_response"].peak_amplitude[0])
+
+    def judge(factor: float = 1.0, still: float = 1.0, **keys: Any) -> Any:
+        waves = note["waves"].astype(complex)
+        waves[0], waves[1:] = still * waves[0], factor * waves[1:]
+        own = {**note, "waves": waves, "alternating": factor * note["alternating"], "mean": still * note["mean"]}
+        table = Stress(**{"fatigue_limit_pa": 30e6, "ultimate_pa": 100e6, "yield_pa": 80e6, **keys})
+        return SimpleNamespace(**with_margin(table, own, peak, slips=False), peak=peak)
+
+    return judge
+
+
+def tensor(stress: Any) -> Any:
+    return np.asarray(stress)[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+
+
+@pytest.mark.parametrize("name", ["crossland", "sines", "dang_van", "findley"])
+def test_criteria_of_a_study_agree_with_a_cycle_drawn_out(stored_stress: Any, name: str) -> None:
+    """Own formulas on a dense cycle: in bending the path of the stress is a line, and balls and circles are half ranges."""
+    f, t, r0 = 30e6, 18e6, 26e6
+    own = stored_stress(torsion_limit_pa=t, fatigue_limit_r0_pa=r0, criterion=name)
+    assert own.stress_rule == name
+    waves = own.worst_stress[..., 0] + 1j * own.worst_stress[..., 1]
+    static = waves[0, 0].real
+    cycle = (waves[1, 0] * np.exp(1j * np.linspace(0, 2 * np.pi, 721))[:, None]).real
+    pressure = np.maximum((static + cycle)[:, :3].sum(axis=1) / 3, 0)
+    moving, still = tensor(cycle), tensor(static)
+    if name in ("crossland", "sines"):
+        deviator = moving - np.trace(moving, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+        radius = np.sqrt(0.5 * (deviator**2).sum(axis=(1, 2))).max()
+        kappa, limit, press = 3 * t / f - np.sqrt(3), t, pressure.max()
+        if name == "sines":
+            kappa, limit, press = np.sqrt(3) * (f / r0 - 1), f / np.sqrt(3), max(static[:3].sum() / 3, 0)
+        wanted = (radius + kappa * press) / limit
+    elif name == "dang_van":
+        principal = np.linalg.eigvalsh(moving)
+        wanted = ((principal[:, 2] - principal[:, 0]) / 2 + 3 * (t / f - 0.5) * pressure).max() / t
+    else:
+        kappa = (2 * t / f - 1) / np.sqrt(1 - (2 * t / f - 1) ** 2)
+        polar, around = np.meshgrid(np.radians(np.arange(0, 180, 0.5)), np.radians(np.arange(0, 180, 7.5)))
+        normals = np.stack(
+            [np.cos(polar), np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around)], axis=-1
+        ).reshape(-1, 3)
+        traction = np.einsum("tij,nj->tni", moving[::10], normals)
+        normal = np.einsum("tni,ni->tn", traction, normals)
+        shear = np.linalg.norm(traction - normal[..., None] * normals, axis=2).max(axis=0)
+        tension = np.einsum("ni,ij,nj->n", normals, still, normals) + normal.max(axis=0)
+        wanted = (shear + kappa * np.maximum(tension, 0)).max() / (t * np.sqrt(1 + kappa**2))
+    place = int(own.worst_place[0])
+    assert own.utilisation[place] == pytest.approx(wanted, rel=3e-4)
+    assert np.isnan(own.allowed_stress).all()
+    assert np.nanargmax(np.where(own.stress_at == 0, own.utilisation, 0)) == place
+
+
+@pytest.mark.parametrize(
+    ("still", "keys"),
+    [
+        (1.0, {}),
+        (-1.0, {"mean_stress": "gerber"}),
+        (14.0, {"above_yield": "shakedown"}),
+        (1.0, {"torsion_limit_pa": 18e6, "criterion": "crossland"}),
+        (1.0, {"fatigue_limit_r0_pa": 26e6, "criterion": "dang_van"}),
+    ],
+    ids=["goodman", "compression", "shakedown", "crossland", "dang van"],
+)
+def test_a_vibration_scaled_to_the_allowed_amplitude_reaches_the_limit(
+    stored_stress: Any, still: float, keys: dict[str, Any]
+) -> None:
+    first = stored_stress(still=still, **keys)
+    factor = first.allowed_amplitude / first.peak
+    assert 0.5 < factor < 5
+    again = stored_stress(factor, still=still, **keys)
+    assert np.nanmax(again.utilisation[again.stress_at == 0]) == pytest.approx(1.0, rel=1e-5)
+    assert again.allowed_amplitude == pytest.approx(again.peak, rel=1e-5)
+
+
+def test_a_load_scaled_to_the_allowed_amplitude_reaches_the_limit(cantilever: Any, tmp_path: Path) -> None:
+    first = cantilever["forced_response"].isel(case=0)
+    assert int(first.stress_slips) == 0
+    factor = float(first.allowed_amplitude / first.peak_amplitude)
+    again = STUDY.replace("force_n = 100.0", f"force_n = {100 * factor!r}")
+    second = ss.Study.from_file(written(tmp_path, again)).run()["forced_response"].isel(case=0)
+    assert float(second.utilisation[int(second.worst_place[0])]) == pytest.approx(1.0, rel=1e-4)
+
+
+def test_no_amplitude_is_endured_beyond_the_static_limit_and_none_is_told_above_yield(stored_stress: Any) -> None:
+    assert (
+        stored_stress(
+            still=20.0, torsion_limit_pa=29e6, yield_pa=None, ultimate_pa=None, criterion="crossland"
+        ).allowed_amplitude
+        == 0.0
+    )
+    assert np.isnan(stored_stress(still=20.0).allowed_amplitude)
+
+
+def test_beyond_the_thousand_worst_places_a_criterion_has_an_upper_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(36)
+    waves = 20e6 * (rng.normal(size=(4, 60, 6)) + 1j * rng.normal(size=(4, 60, 6)))
+    waves[0] = 3 * waves[0].real
+    limits = np.linspace(90e6, 200e6, 60)
+    card = StrengthCard(fatigue_limit_pa=limits, torsion_limit_pa=0.62 * limits)
+    counted = np.arange(60) % 3 > 0
+    for name, function in CRITERIA.items():
+        if name == "sines":
+            continue
+        every = function(waves, card)
+        monkeypatch.setattr(cycle, "WORST_PLACES", 20)
+        monkeypatch.setattr(cycle, "BATCH", 20)
+        monkeypatch.setattr(cycle, "CERTAIN", 3)
+        found = worst_utilisation(name, waves, card, counted)
+        exact = np.isclose(found, every, rtol=1e-6)
+        assert 20 <= exact.sum() < 60
+        assert np.all(found >= every * (1 - 1e-6))
+        assert exact[np.argsort(-np.where(counted, every, -1))[:3]].all()
+
+
+def test_cards_of_parts_and_over_temperature(stored_stress: Any, tmp_path: Path) -> None:
+    plain = stored_stress()
+    own = {"fatigue_limit_pa": 60e6, "ultimate_pa": 100e6, "yield_pa": 80e6}
+    of_part = stored_stress(card={"beam": own}, fatigue_limit_pa=10e6)
+    assert of_part.utilisation == pytest.approx(0.5 * plain.utilisation, nan_ok=True, rel=1e-12)
+    assert of_part.fatigue_limit == 60e6
+    rows = [{"temperature_c": t, "fatigue_limit_pa": f} for t, f in ((20.0, 30e6), (420.0, 10e6))]
+    told = stored_stress(fatigue_limit_pa=None, over_temperature=rows)
+    assert "needs temperatures of the part 'beam'" in told.stress_doubt
+    study = STUDY.replace(
+        "fatigue_limit_pa = 30e6",
+        "over_temperature = [{ temperature_c = 20, fatigue_limit_pa = 3e7 }, { temperature_c = 420, fatigue_limit_pa = 1e7 }]",
+    )
+    with pytest.raises(InputError, match=r"stress.over_temperature: needs temperatures of the part 'beam'"):
+        ss.Study.from_file(written(tmp_path, study)).run()
+    hot = (
+        study
+        + "[material]\nyoung_modulus_pa = 2e11\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 7800\nexpansion_per_k = 1e-5\n[temperature]\nstress_free_c = 220\nuniform_c = 220\n"
+    )
+    data = ss.Study.from_file(written(tmp_path, hot)).run()["forced_response"].isel(case=0)
+    place = int(data.worst_place[0])
+    amplitude, mean = float(data.alternating_stress[place]), float(data.mean_stress[place])
+    assert float(data.utilisation[place]) == pytest.approx(amplitude / (20e6 * (1 - mean / 100e6)), rel=1e-9)
+    assert float(data.fatigue_limit) == pytest.approx(20e6)
+    with pytest.raises(InputError, match=r"stress.over_temperature: end at 420, and the material has up to 430"):
+        ss.Study.from_file(written(tmp_path, hot.replace("uniform_c = 220", "uniform_c = 430"))).run()
+
+
+def test_limits_without_effect_and_doubtful_ones_are_told(tmp_path: Path, stored_stress: Any) -> None:
+    own = stored_stress(walker_exponent=0.5, torsion_limit_pa=18e6)
+    assert own.stress_idle == "walker_exponent and torsion_limit_pa of [stress] have no effect with goodman"
+    assert stored_stress(walker_exponent=0.5, mean_stress="walker").stress_idle == ""
+    brittle = 'torsion_limit_pa = 26e6\nwalker_exponent = 0.5\ncriterion = "crossland"\n'
+    out = CliRunner().invoke(app, ["run", str(written(tmp_path, STUDY + brittle))])
+    told = " ".join(out.output.split())
+    assert "crossland is doubtful above 0.8" in told
+    assert "alker_exponent of [stress] has no effect with crossland" in told
+
+
+def test_decks_of_different_meshes_have_their_own_pictures(tmp_path: Path) -> None:
+    written(tmp_path)
+    mesh = box(20, (LENGTH, SIDE, SIDE), (8, 2, 2))
+    x, y, z = mesh.points.T
+    tip = np.isclose(x, LENGTH) & np.isclose(y, y.mean()) & np.isclose(z, z.mean())
+    sets = {
+        **mesh.node_sets,
+        "tip": np.flatnonzero(tip),
+        "middle": np.flatnonzero(np.isclose(x, 0.5 * LENGTH) & np.isclose(y, y.max())),
+    }
+    write_deck(SolidMesh(mesh.points, mesh.cells, sets), Material(), tmp_path / "other.inp")
+    (tmp_path / "study.toml").write_text(
+        STUDY + '[vary]\npart.beam.file = ["beam.inp", "other.inp"]\n', encoding="utf-8"
+    )
+    result = ss.Study.from_file(tmp_path / "study.toml").run()
+    data = result["forced_response"]
+    assert set(data.drawn_face_case.values) == set(data.drawn_load_case.values) == {0, 1}
+    assert np.bincount(data.drawn_support_case.values).min() > 0
+    for case in (0, 1):
+        own = read(Drawn, data, case)
+        assert own.drawn_triangle is not None
+        assert own.drawn_kind is not None
+        points = np.isfinite(own.drawn_point).all(axis=1)
+        assert own.drawn_triangle.max() == points.sum() - 1
+        assert set(own.drawn_kind[points]) == {"mesh"}
+        stress = read(SurfaceStress, data, case)
+        assert stress.stress_triangle is not None
+        assert stress.stress_triangle.max() == np.isfinite(stress.utilisation).sum() - 1
+    assert (result.report(tmp_path / "page.html")).stat().st_size > 1e5
+
+
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
@@ -216,10 +446,51 @@ def test_a_case_without_stress_keeps_its_motion_and_the_stress_of_the_others(
             r"stress.credit_in_compression: is true",
         ),
         ("yield_pa = 80e6", "yield_pa = 200e6", r"stress.yield_pa: must be at most ultimate_pa"),
+        ("yield_pa = 80e6", 'criterion = "sines"', r"stress.fatigue_limit_r0_pa: is missing, and Sines needs it"),
+        ("yield_pa = 80e6", 'criterion = "crossland"', r"stress.torsion_limit_pa: is missing, and Crossland needs it"),
+        (
+            "yield_pa = 80e6",
+            'criterion = "crossland"\ntorsion_limit_pa = 15e6',
+            r"stress.torsion_limit_pa: over fatigue_limit_pa = 0.5",
+        ),
+        (
+            "yield_pa = 80e6",
+            'criterion = "findley"\ntorsion_limit_pa = 18e6\nmean_stress = "goodman"',
+            r"stress.mean_stress: is given, and findley has its own",
+        ),
+        (
+            "yield_pa = 80e6",
+            'criterion = "findley"\ntorsion_limit_pa = 18e6\nyield_pa = 80e6\nabove_yield = "shakedown"',
+            r"stress.above_yield: is given, and findley voids",
+        ),
+        ("fatigue_limit_pa = 30e6\n", "[stress.card.beam]\nfatigue_limit_pa = 30e6\n", ""),
+        (
+            "fatigue_limit_pa = 30e6\n",
+            "[stress.card.disk]\nfatigue_limit_pa = 30e6\n",
+            r"stress.card.disk: .*no part .*Did you mean|stress.card.disk: is no part",
+        ),
+        (
+            "fatigue_limit_pa = 30e6\n",
+            "fatigue_limit_pa = 30e6\n[stress.card.beam]\nfatigue_limit_pa = 30e6\n",
+            r"stress.ultimate_pa: is missing",
+        ),
+        (
+            "fatigue_limit_pa = 30e6\n",
+            "over_temperature = [{ temperature_c = 400, fatigue_limit_pa = 2e7 }, { temperature_c = 20, fatigue_limit_pa = 3e7 }]\n",
+            r"stress.over_temperature: has temperatures \[400.0, 20.0\]",
+        ),
+        (
+            "fatigue_limit_pa = 30e6\n",
+            "over_temperature = [{ temperature_c = 20, fatigue_limit_pa = 2e7 }, { temperature_c = 400, fracture_pa = 3e8 }]\n",
+            r"stress.over_temperature: lacks fatigue_limit_pa at 400",
+        ),
     ],
 )
 def test_a_card_that_does_not_fit_is_refused_by_key(tmp_path: Path, old: str, new: str, says: str) -> None:
     study = written(tmp_path, STUDY.replace(old, new))
+    if not says:
+        assert read_study(study).cases()[0].settings.stress.asked
+        return
     with pytest.raises(InputError, match=says):
         read_study(study)
 

@@ -3,7 +3,7 @@
 Editors complete them, and type checkers compare names, types and required keys.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, Required, TypedDict
 
 from stickslip.arrays import FloatArray, IntArray
@@ -90,6 +90,10 @@ class StressKeys(TypedDict, total=False):
 
     fatigue_limit_pa: float | None
     """stress amplitude in Pa that is endured at R = -1; it asks for stress and margin"""
+    fatigue_limit_r0_pa: float | None
+    """stress amplitude in Pa, half of the range, that is endured at R = 0, for a criterion"""
+    torsion_limit_pa: float | None
+    """shear stress amplitude in Pa that is endured under alternating torsion, for a criterion"""
     ultimate_pa: float | None
     """tensile strength in Pa, for goodman and gerber"""
     yield_pa: float | None
@@ -98,8 +102,14 @@ class StressKeys(TypedDict, total=False):
     """true fracture strength in Pa, for morrow"""
     walker_exponent: float | None
     """Walker's exponent γ, for walker, up to 1"""
+    over_temperature: Sequence[Mapping[str, object]] | None
+    """the tables [[stress.over_temperature]]: limits at rising temperatures of the nodes; linear between, constant below, refused above"""
+    card: Mapping[str, Mapping[str, object]]
+    """the tables [stress.card.NAME], limits of the part NAME; the limits of [stress] hold for all other parts; default {}"""
     mean_stress: Literal["goodman", "gerber", "soderberg", "morrow", "walker"]
     """line of the Haigh diagram from the fatigue limit to the static limit; default 'goodman'"""
+    criterion: Literal["crossland", "sines", "findley", "dang_van"] | None
+    """criterion for multiaxial fatigue instead of a line of the Haigh diagram: crossland, dang_van or findley (with torsion_limit_pa or fatigue_limit_r0_pa), or sines (with fatigue_limit_r0_pa)"""
     above_yield: Literal["void", "shakedown"]
     """where the elastic static stress is above yield. void: there is no margin; shakedown: the mean stress is at most yield less the amplitude; default 'void'"""
     credit_in_compression: bool

@@ -209,6 +209,11 @@ def judged_when_made(data: xr.Dataset) -> tuple[Verdict, ...]:
     return stored(data.attrs)
 
 
+def nothing_asked(_case: Case) -> frozenset[str]:
+    """Return no additional check."""
+    return frozenset()
+
+
 def nothing_to_add(data: xr.Dataset, _measured: MeasuredPeaks | None) -> xr.Dataset:
     """Return the dataset unchanged."""
     return data
@@ -251,6 +256,8 @@ class Analysis:
     checks
         Names of additional checks that a run may request (``verify``). A sealed job without them is opened again: `solve` then finds all
         records done and writes the outcome of the checks into the notes.
+    asks
+        Returns further names of this kind, of what the tables of a case ask for beside its records and what `key` leaves out.
     verdicts
         Returns the verdicts on a finished dataset, the only ones that terminal, page, file and Python show.
     completed
@@ -270,6 +277,7 @@ class Analysis:
     shared: tuple[str, ...] = ()
     answers: tuple[type[Any], ...] = ()
     checks: tuple[str, ...] = ()
+    asks: Callable[[Case], frozenset[str]] = nothing_asked
     verdicts: Callable[[xr.Dataset], tuple[Verdict, ...]] = judged_when_made
     completed: Callable[[xr.Dataset, MeasuredPeaks | None], xr.Dataset] = nothing_to_add
 

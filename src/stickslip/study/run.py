@@ -378,7 +378,7 @@ def _tasks(
     found = []
     for own in asked_for(study):
         wanted = checks & frozenset(own.checks) if own in asked else frozenset()
-        found += [_task(own, replace(c, checks=wanted), study.folder, versions) for c in cases]
+        found += [_task(own, replace(c, checks=wanted | own.asks(c)), study.folder, versions) for c in cases]
     return found
 
 

@@ -17,7 +17,9 @@ from stickslip.analyses.forced_response.problem import (
     HARMONICS,
     IN_TIME,
     STABLE,
+    STRESS,
     Question,
+    asked_beside,
     question_of,
     strength_of,
     with_comparisons,
@@ -50,7 +52,7 @@ from stickslip.analyses.forced_response.stability.not_periodic import (
 )
 from stickslip.analyses.forced_response.stability.stable import Examined, with_motion, without_raised
 from stickslip.analyses.forced_response.stability.stable_words import peak_word, point_of, stability_log
-from stickslip.analyses.forced_response.stress import of_stress
+from stickslip.analyses.forced_response.stress import of_stress, with_margin
 from stickslip.analyses.forced_response.summary import tables
 from stickslip.analyses.forced_response.table import ForcedResponse
 from stickslip.analyses.forced_response.verdicts.cases import verdicts
@@ -78,7 +80,6 @@ COMPILED = 5.0  # seconds of the first evaluation, below which the code was alre
 BLADES = "blades"  # note of a mistuned wheel
 BIFURCATIONS = "bifurcations"
 JACOBIANS = "jacobians"
-STRESS = "stress"
 NOT_PERIODIC = "not_periodic"
 NOTES = (
     "model",
@@ -91,18 +92,7 @@ NOTES = (
     HARMONICS,
     JACOBIANS,
     PHYSICS,
-    STRESS,
 )  # notes that make up the dataset
-
-
-_OWN_TABLES = of_tables("forced_response", "harmonics", "solver")
-
-
-def _key(case: Case) -> str:
-    """Return what the records depend on; results without [stress] keep their keys."""
-    strength = strength_of(case)
-    own = _OWN_TABLES(case)
-    return own if strength.fatigue_limit_pa is None else own + strength.model_dump_json()
 
 
 def _inputs(case: Case, model: Model) -> Question:
@@ -157,9 +147,18 @@ def _of_peak(question: Question, response: Response, notes: Notes) -> None:
 
 def _dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the responses of all cases."""
-    cases = [_values(s) | _operating(s) for s in solved]
+    cases = [_with_stress(s, _values(s) | _operating(s)) for s in solved]
     labels = [s.case.label for s in solved]
     return put_together(cases, labels)
+
+
+def _with_stress(solved: Solved, values: Values) -> Values:
+    """Return the values with stress and margin, if the case asks for them; a changed card takes the stored stress."""
+    table, note = strength_of(solved.case), solved.notes.get(STRESS)
+    if not table.asked or note is None:
+        return values
+    slips = bool(np.any(np.asarray(values.get("peak_state", 0)) > 0))
+    return values | with_margin(table, note, float(values["peak_amplitude"]), slips=slips)
 
 
 def _operating(solved: Solved) -> Values:
@@ -368,7 +367,7 @@ FORCED_RESPONSE = Analysis(
     name="forced_response",
     table=ForcedResponse,
     record=ForcedPoint,
-    key=_key,
+    key=of_tables("forced_response", "harmonics", "solver"),
     inputs=_inputs,
     solve=_solve,
     dataset=_dataset,
@@ -377,6 +376,7 @@ FORCED_RESPONSE = Analysis(
     shared=("harmonics", "solver", "limits", "operation", "stress"),
     answers=KINDS,
     checks=(IN_TIME, HARMONICS),
+    asks=asked_beside,
     verdicts=_verdicts,
     completed=_completed,
 )

@@ -24,12 +24,12 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.scene import Scene, scene_of
 from stickslip.assembly.sides.unreduced import KEPT, refuse_whole
 from stickslip.contact.laws import law_name
-from stickslip.errors import InputError, input_error, together
+from stickslip.errors import InputError, did_you_mean, input_error, together
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import is_full, named
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
-from stickslip.model.strength import StrengthCard, allowable_amplitude
+from stickslip.model.strength import StrengthCard
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.choices import RUNGS, RelativeTo
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
@@ -131,8 +131,8 @@ def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, floa
     return lowest, highest
 
 
-HAIGH_POINTS = 65  # of the line of a Haigh diagram
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+STRESS = "stress"  # note that a study may ask for
 STILL_HZ = 5e-3  # lower frequencies are those of rigid motions
 STABLE = "stability"  # check of every run, unless the study turns it off
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
@@ -145,7 +145,7 @@ MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or
 
 @dataclass(frozen=True, eq=False)
 class StressAsked:
-    """The model whose stress is asked for, and how it is judged.
+    """The model whose stress is asked for.
 
     Parameters
     ----------
@@ -153,31 +153,10 @@ class StressAsked:
         The model before its assembly.
     orders
         Highest harmonics with which its assembly is tried, until the outputs agree.
-    card
-        Strength of the material.
-    mean_stress, above_yield, credit_in_compression
-        As in `stickslip.model.strength.margin`.
-    apart
-        Distance from contacts, joins, supports and loaded nodes that counts as singular, m; None: one element.
     """
 
     model: Model
     orders: tuple[int, int]
-    card: StrengthCard
-    mean_stress: str = "goodman"
-    above_yield: Literal["void", "shakedown"] = "void"
-    credit_in_compression: bool = False
-    apart: float | None = None
-
-    @property
-    def line(self) -> tuple[FloatArray, FloatArray]:
-        """Mean stress and allowed amplitude of the Haigh diagram, (n,) each, Pa."""
-        limits = (self.card.yield_pa, self.card.ultimate_pa, self.card.fracture_pa, self.card.fatigue_limit_pa)
-        end = next(float(np.max(limit)) for limit in limits if limit is not None)
-        mean = np.linspace(-end, end, HAIGH_POINTS)
-        return mean, allowable_amplitude(
-            self.mean_stress, self.card, mean, credit_in_compression=self.credit_in_compression
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +204,7 @@ class Question:
     stepping
         Time steps of a response by shooting; None: by harmonic balance.
     stress
-        How the stress at the peak is judged; None: it is not asked for.
+        Model whose stress at the peak is computed; None: it is not asked for.
     """
 
     label: str
@@ -356,19 +335,10 @@ def with_comparisons(question: Question, case: Case, model: Model) -> Question:
 
 
 def _stress_of(case: Case, model: Model, sweep: Sweep) -> StressAsked | None:
-    table = strength_of(case)
-    if table.fatigue_limit_pa is None:
+    if not strength_of(case).asked:
         return None
     highest = int(sweep.high_harmonics[-1])
-    return StressAsked(
-        model=model,
-        orders=(JUDGED_MULTIPLE * highest, highest),
-        card=table.card(),
-        mean_stress=table.mean_stress,
-        above_yield=table.above_yield,
-        credit_in_compression=table.credit_in_compression,
-        apart=table.apart_m,
-    )
+    return StressAsked(model, (JUDGED_MULTIPLE * highest, highest))
 
 
 def strength_of(case: Case) -> Stress:
@@ -377,10 +347,15 @@ def strength_of(case: Case) -> Stress:
     return found
 
 
+def asked_beside(case: Case) -> frozenset[str]:
+    """Return the note that a case asks for beside its records: the stress at its peak."""
+    return frozenset({STRESS} if strength_of(case).asked else ())
+
+
 def _refuse_stress(case: Case, model: Model) -> None:
-    """Refuse the stress of a model that has none, and a rule whose limits are missing."""
+    """Refuse the stress of a model that has none, and cards that do not fit its parts."""
     table = strength_of(case)
-    if table.fatigue_limit_pa is None:
+    if not table.asked:
         return
     key = "stress.fatigue_limit_pa"
     if model.mistuning is not None:
@@ -389,12 +364,50 @@ def _refuse_stress(case: Case, model: Model) -> None:
         )
     if model.stages is not None:
         raise input_error(key, "asks for the stress of several coupled wheels, which is not computed", "Ask one wheel.")
-    if all(part.solid is None for part in model.parts.values()):
+    solids = {name: part.solid for name, part in model.parts.items() if part.solid is not None}
+    if not solids:
         raise input_error(
             key,
             "asks for stress, and no part has elements and a material",
             "Give the deck with its elements instead of matrices, or remove [stress].",
         )
+    for name in table.card:
+        if name not in solids:
+            raise input_error(
+                f"stress.card.{name}",
+                "is no part with elements and a material",
+                did_you_mean(name, list(solids)),
+            )
+    for name, solid in solids.items():
+        card_of(table, name, np.array([np.nan]) if solid.temperature is None else solid.temperature.values)
+
+
+def card_of(table: Stress, part: str, temperature: FloatArray) -> StrengthCard:
+    """Return the strength of a part at the temperatures (k,) of its nodes, NaN without any.
+
+    Raises
+    ------
+    InputError
+        If the part has no limits, or limits over temperature and no temperature, or one above the last of the card.
+    """
+    own = table.table_of(part)
+    if own is None:
+        raise input_error(
+            "stress",
+            f"has no limits of the part {part!r}",
+            f"Add [stress.card.{part}], or give the limits of all other parts in [stress].",
+        )
+    card = own.strength()
+    if card.temperatures and np.isnan(temperature).any():
+        raise input_error(
+            "stress.over_temperature",
+            f"needs temperatures of the part {part!r}, and it has none",
+            "Give [temperature], and a material that depends on it (over_temperature, expansion_per_k); or limits at one temperature.",
+        )
+    try:
+        return card.at(temperature)
+    except InputError as error:
+        raise input_error("stress.over_temperature", f"{error.problem} (part {part!r})", error.remedy) from None
 
 
 def question_of(case: Case, model: Model) -> Question:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.units import quantity, quantity_of
 
@@ -113,6 +113,12 @@ class StrengthCard:
             if name != "temperatures" and isinstance(value, tuple)
         }
         return replace(self, temperatures=(), **changed)
+
+    def take(self, places: IntArray | BoolArray) -> "StrengthCard":
+        """Return the card of some of the places whose limits are arrays (k,); other limits stay."""
+        each: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        some: dict[str, Any] = {name: own[places] for name, own in each.items() if isinstance(own, np.ndarray)}
+        return replace(self, **some)
 
     def need(self, rule: str, *names: str) -> list[FloatArray]:
         """Return limits by the names of their fields, as arrays.

@@ -31,6 +31,9 @@ BEST_PLANES = 3  # of the coarse ones, from which the search goes on
 FINEST_STEP = 1e-3  # angle at which the search ends, rad: a smooth maximum is then right to 1e-6
 GRID_PARTS = 8  # in which the coarse planes are looked at
 LAST_CHOICE = 0.02  # step of the search below which only the best plane is followed, rad
+WORST_PLACES = 1000  # of which a criterion is computed at least; others have an upper bound
+CERTAIN = 10  # worst places that no bound of the others may exceed
+BATCH = 250
 PLACES_AT_ONCE = 200  # whose shear paths are held in memory together
 DOUBTFUL_TORSION = 0.8  # torsion limit over fatigue limit, above which metals are brittle and criteria doubtful
 DOUBTFUL_LIMIT = 1.1  # predicted over stated limit, above which a criterion does not fit the card
@@ -214,6 +217,60 @@ def critical_plane(harmonics: ComplexArray, card: StrengthCard, *, credit_in_com
     )
 
 
+def worst_utilisation(
+    criterion: Criterion,
+    harmonics: ComplexArray,
+    card: StrengthCard,
+    counted: BoolArray,
+    *,
+    credit_in_compression: bool = False,
+) -> FloatArray:
+    """Return the utilisation (k,) by a criterion at the worst places, and an upper bound of it at all others.
+
+    Places are computed in the order of the bound: at least 1000, and until no bound exceeds the tenth largest utilisation of the
+    `counted` ones. The bound takes the alternating stress over √3 for the shear amplitude, and for the normal stress of a plane the
+    largest hydrostatic stress and 2/√3 of the largest √J2.
+
+    Parameters
+    ----------
+    criterion
+        ``"crossland"``, ``"sines"``, ``"findley"`` or ``"dang_van"``.
+    harmonics, card, credit_in_compression
+        As of `crossland`; limits of the card may be arrays (k,).
+    counted
+        (k,) places among which the worst are looked for.
+    """
+    given = _below_yield(harmonics, card)
+    factor, limit = _constants(criterion, card)
+
+    def bound(own: ComplexArray, factor: FloatArray, limit: FloatArray) -> FloatArray:
+        pressure, shear = own[..., :3].sum(axis=-1) / 3, _alternating(own) / np.sqrt(3)
+        normal = pressure[0].real if criterion == "sines" else _largest(pressure)
+        if criterion == "findley":
+            normal = normal + 2 / np.sqrt(3) * (von_mises(own[0].real) / np.sqrt(3) + shear)
+        return np.asarray((shear + factor * _credited(normal, credit_in_compression)) / limit)
+
+    found = _where_finite(bound, given, factor, limit)
+    known = np.isnan(found)
+    order = np.argsort(-np.where(known, -np.inf, found), kind="stable")[: np.count_nonzero(~known)]
+    for first in range(0, order.size, BATCH):
+        sure = np.sort(found[known & counted & np.isfinite(found)])[-CERTAIN:]
+        if first >= WORST_PLACES and sure.size == CERTAIN and found[order[first]] <= sure[0]:
+            break
+        some = order[first : first + BATCH]
+        found[some] = CRITERIA[criterion](given[:, some], card.take(some), credit_in_compression=credit_in_compression)
+        known[some] = True
+    return found
+
+
+CRITERIA: dict[Criterion, Callable[..., FloatArray]] = {
+    "crossland": crossland,
+    "sines": sines,
+    "findley": critical_plane,
+    "dang_van": dang_van,
+}
+
+
 def criterion_doubt(criterion: Criterion, card: StrengthCard) -> str:
     """Return why a criterion is doubtful with the limits of a card, as a sentence; empty: it fits.
 
@@ -229,7 +286,7 @@ def criterion_doubt(criterion: Criterion, card: StrengthCard) -> str:
     InputError
         If the criterion cannot be used with the card.
     """
-    check_choice("criterion", criterion, ("crossland", "sines", "findley", "dang_van"))
+    check_choice("criterion", criterion, CRITERIA)
     factor, limit = _constants(criterion, card)
     tension, torsion, repeated = (
         None if value is None else np.asarray(value, dtype=float)

@@ -14,6 +14,7 @@ from stickslip.errors import check_choice, input_error, missing_package
 from stickslip.model.strength.card import StrengthCard
 
 NEWTON_STEPS = 60
+NO_YIELD = "the card has no yield_pa: whether the static stress is above yield is not known"
 AboveYield = Literal["void", "shakedown", "neuber"]
 
 
@@ -267,11 +268,7 @@ def margin(
         factor = np.where(own > 0, allowed / own, np.where(allowed > 0, np.inf, 0.0 * allowed))
     factor = np.where(np.isnan(own), np.nan, factor)
     utilisation = np.where(np.isnan(own), np.nan, utilisation)
-    doubt = (
-        ""
-        if card.yield_pa is not None
-        else "the card has no yield_pa: whether the static stress is above yield is not known"
-    )
+    doubt = "" if card.yield_pa is not None else NO_YIELD
     return Margin(np.where(void, np.nan, used), allowed, utilisation, factor, void, doubt)
 
 

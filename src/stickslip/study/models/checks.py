@@ -77,6 +77,9 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from mistuning_refusals(tables, home, sectors_of(tables))
         yield from stage_refusals(tables)
         yield from run_up_refusals(tables)
+        for name in tables.stress.card:
+            if name not in tables.part:
+                yield input_error(f"stress.card.{name}", "is no part", did_you_mean(name, list(tables.part)))
 
 
 def sectors_of(tables: Tables) -> int | None:

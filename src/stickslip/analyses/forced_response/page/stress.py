@@ -6,13 +6,13 @@ import plotly.graph_objects as go
 from stickslip.analyses.forced_response.page.at_peak.contacts import chosen_case
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import STRESS_AT, SurfaceStress, holds, read
-from stickslip.analyses.forced_response.verdicts.margin import Place, places_of, size_of, worst_of
+from stickslip.analyses.forced_response.verdicts.margin import Place, name_of, places_of, size_of, worst_of
 from stickslip.analyses.pictures import space, surface
 from stickslip.arrays import FloatArray
 from stickslip.model.strength import history, von_mises
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, legend_above, styled
-from stickslip.report.quantities import aligned, number, percent
+from stickslip.report.quantities import aligned, number, percent, quantity
 from stickslip.report.section import Card, Chooser, Table
 
 MPA = 1e6
@@ -75,7 +75,7 @@ def stress_surface(response: Response) -> Plot | None:
     styled(figure, 520)
     figure.update_layout(scene=space(found.min(axis=0), found.max(axis=0), close=False))
     legend_above(figure)
-    caption = "Alternating stress over the stress that the material endures at its mean, at the peak, on the surfaces of the meshed parts."
+    caption = "Alternating stress over the stress that the material endures at its mean, or that of the criterion, at the peak, on the surfaces of the meshed parts."
     return Plot("stress_surface", "Utilisation at the peak", caption, figure, captions, response.chosen)
 
 
@@ -116,12 +116,21 @@ def _caption(own: SurfaceStress, places: list[Place]) -> str:
         for kind in kinds
     )
     singular = f" Listed apart, as elastic stress is singular there: up to {apart} (alternating)." if apart else ""
-    return f"Worst: {first.name} ({first.where} mm), utilisation {number(first.utilisation, 3)}.{singular}"
+    by = "" if np.isfinite(first.allowed) or np.isnan(first.utilisation) else f" by {name_of(own)}"
+    return f"Worst: {first.name} ({first.where} mm), utilisation {number(first.utilisation, 3)}{by}.{_scaled(own)}{singular}"
+
+
+def _scaled(own: SurfaceStress) -> str:
+    """Say at which amplitude the limit is reached."""
+    if not np.isfinite(own.allowed_amplitude):
+        return ""
+    how = "an estimate, as contacts slip or open" if own.stress_slips else "exact while contacts stick"
+    return f" It reaches its limit at {quantity(float(own.allowed_amplitude), 'm')} of the report output, by scaling the vibration: {how}."
 
 
 def haigh(response: Response) -> Plot | None:
     """Draw the Haigh diagram with the surface nodes."""
-    known = _known(response)
+    known = {case: own for case, own in _known(response).items() if np.isfinite(own.haigh_amplitude).any()}
     if not known:
         return None
     figure, captions = go.Figure(), {}
@@ -156,7 +165,7 @@ def _margin_words(own: SurfaceStress) -> str:
         return ""
     if np.isnan(place.utilisation):
         return f"Worst: {place.name}. Its stress is above yield, there is no margin."
-    return f"Worst: {place.name}, factor {number(1 / place.utilisation, 3)} to the line."
+    return f"Line: {name_of(own)}, limits of the worst place. Worst: {place.name}, factor {number(1 / place.utilisation, 3)} to the line."
 
 
 def worst_places(response: Response) -> Table | None:

@@ -243,12 +243,14 @@ class Drawn:
         "points of the surfaces in pictures: some nodes of meshes, rigid bodies, cubes at nodes without a mesh and at lumped masses, which stand in a row 1 m apart",
         along="case drawn_node xyz",
     )
+    drawn_face_case: IntArray | None = column("1", "case of a triangle", along="drawn_face", default=None)
     drawn_triangle: IntArray | None = column("1", "triangles between them", along="drawn_face corner", default=None)
-    drawn_part: TextArray | None = column("1", "part of each point", along="drawn_node", default=None)
+    drawn_part: TextArray | None = column("1", "part of each point", along="case drawn_node", default=None)
     drawn_kind: TextArray | None = column(
-        "1", "what it is drawn from: mesh, section, contact faces, node or mass", along="drawn_node", default=None
+        "1", "what it is drawn from: mesh, section, contact faces, node or mass", along="case drawn_node", default=None
     )
     drawn_contact: FloatArray = column("m", "places of the contact points in pictures", along="contact xyz")
+    drawn_load_case: IntArray | None = column("1", "case of such a load", along="drawn_load", default=None)
     drawn_load: TextArray | None = column("1", "name of a load with a place", along="drawn_load", default=None)
     drawn_load_harmonic: IntArray | None = column(
         "1", "its harmonic, 0 for a static load", along="drawn_load", default=None
@@ -257,6 +259,7 @@ class Drawn:
     drawn_load_direction: FloatArray | None = column(
         "1", "unit vector of its direction", along="drawn_load xyz", default=None
     )
+    drawn_support_case: IntArray | None = column("1", "case of such a point", along="drawn_support", default=None)
     drawn_support: FloatArray | None = column(
         "m", "points that are held, of those that are drawn", along="drawn_support xyz", default=None
     )
@@ -630,11 +633,18 @@ class SurfaceStress:
         "equivalent stress of the static state, with the sign of its largest principal stress; where asked for, after shakedown",
         along="case stress_place",
     )
+    static_stress: FloatArray = column(
+        "Pa", "stress of the static state, before shakedown", along="case stress_place component"
+    )
     allowed_stress: FloatArray = column(
-        "Pa", "alternating stress that the material endures at this mean stress", along="case stress_place"
+        "Pa",
+        "alternating stress that the material endures at this mean stress, NaN with a criterion",
+        along="case stress_place",
     )
     utilisation: FloatArray = column(
-        "1", "alternating over allowed stress; NaN where the static stress is above yield", along="case stress_place"
+        "1",
+        "alternating over allowed stress, or that of the criterion, beyond its thousand worst places an upper bound; NaN where the static stress is above yield",
+        along="case stress_place",
     )
     stress_mesh_error: FloatArray = column(
         "1",
@@ -653,10 +663,22 @@ class SurfaceStress:
         "Pa", "their stress xx, yy, zz, xy, yz, xz in each harmonic", along="case stress_harmonic worst component part"
     )
     stress_doubt: str = column("1", "what the margin leaves open, empty if nothing", along="case")
+    stress_idle: str = column("1", "limits that have no effect, empty without any", along="case")
+    stress_rule: str = column("1", "line of the Haigh diagram, or criterion, by which stress is judged", along="case")
+    allowed_amplitude: float = column(
+        "m",
+        "amplitude of the report output at which the worst place reaches its limit, the vibration scaled at the static stress of the peak; NaN without a margin",
+        along="case",
+    )
+    stress_slips: int = column(
+        "1", "1 if a contact slips or opens at the peak, so that scaling is an estimate", along="case"
+    )
     stress_shakedown: int = column("1", "1 if the mean stress is bounded by shakedown", along="case")
     fatigue_limit: float = column("Pa", "amplitude endured at R = -1", along="case")
     haigh_mean: FloatArray = column("Pa", "mean stress of the Haigh diagram", along="case haigh")
-    haigh_amplitude: FloatArray = column("Pa", "amplitude endured at that mean stress", along="case haigh")
+    haigh_amplitude: FloatArray = column(
+        "Pa", "amplitude endured at that mean stress, NaN with a criterion", along="case haigh"
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

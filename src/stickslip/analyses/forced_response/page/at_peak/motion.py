@@ -97,7 +97,7 @@ def in_motion(response: Response) -> Plot | None:
     cases = _cases(response)
     known = np.isfinite(own.drawn_point).all(axis=1)
     points, contacts = MM * own.drawn_point[known], MM * own.drawn_contact
-    if own.drawn_triangle is None or not np.isfinite(contacts).all():
+    if own.drawn_triangle is None or own.drawn_kind is None or not np.isfinite(contacts).all():
         return None
     pairs, sharp = edges(points, own.drawn_triangle)
     every = np.vstack([points, contacts])
@@ -106,7 +106,7 @@ def in_motion(response: Response) -> Plot | None:
     figure.add_trace(_contacts(response, contacts, next(iter(cases.values()))))
     figure.add_traces(_frames(response, contacts, FRAME * span))
     figure.add_traces([*_loads(own, ARROW * span), *_supports(own), *_keys()])
-    _laid_out(figure, every, flat=bool(own.drawn_kind is not None and np.all(own.drawn_kind == "mass")))
+    _laid_out(figure, every, flat=bool(np.all(own.drawn_kind[known] == "mass")))
     views = {"whole": _view(figure.layout.scene)}
     if float(np.ptp(contacts, axis=0).max()) < CONTACT_SHARE_OF_SIZE * span:
         views["contacts"] = _view(_scene_of(contacts, 1.6, 0.4))
