@@ -1,5 +1,6 @@
 """Stress and margin of a study: a cantilever against beam theory, verdicts and page, and what is refused."""
 
+import csv
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +19,16 @@ from stickslip.analyses.forced_response.records.columns import STRESS_AT, Drawn,
 from stickslip.analyses.forced_response.stress import with_margin
 from stickslip.cli import app
 from stickslip.errors import InputError
+from stickslip.model.axis import Axis
 from stickslip.model.deck import write_deck
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.readers.frd import read_frd
+from stickslip.model.readers.units import Units
 from stickslip.model.strength import StrengthCard, cycle
 from stickslip.model.strength.cycle import CRITERIA, worst_utilisation
 from stickslip.study.exchange.motion import expanded
+from stickslip.study.exchange.stress import SurfaceFields
 from stickslip.study.file.model.strength import Stress
 from stickslip.study.models.study import read_study
 from stickslip.study.store.journal import read_note
@@ -89,9 +94,16 @@ def written(folder: Path, text: str = STUDY) -> Path:
 
 
 @pytest.fixture(scope="module")
-def cantilever(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    folder = tmp_path_factory.mktemp("stress")
-    return ss.Study.from_file(written(folder)).run()
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the study and of its results."""
+    place = tmp_path_factory.mktemp("stress")
+    ss.Study.from_file(written(place)).run()
+    return place
+
+
+@pytest.fixture(scope="module")
+def cantilever(folder: Path) -> Any:
+    return ss.Result.from_file(folder / "results")
 
 
 def test_stress_and_margin_are_those_of_beam_theory(cantilever: Any) -> None:
@@ -197,12 +209,10 @@ def test_a_changed_card_takes_the_stored_stress(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.fixture(scope="module")
-def stored_stress(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The note of a run, and a function that judges it by a table [stress]."""
-    folder = tmp_path_factory.mktemp("note")
-    result = ss.Study.from_file(written(folder)).run()
+def stored_stress(folder: Path, cantilever: Any) -> Any:
+    """A function that judges the note of the run by a table [stress]."""
     (job,) = (folder / "results" / "jobs").glob("*.job")
-    note, peak = read_note(job, "stress"), float(result["forced_response"].peak_amplitude[0])
+    note, peak = read_note(job, "stress"), float(cantilever["forced_response"].peak_amplitude[0])
 
     def judge(factor: float = 1.0, still: float = 1.0, **keys: Any) -> Any:
         waves = note["waves"].astype(complex)
@@ -504,3 +514,87 @@ def test_stress_of_matrices_is_refused_with_the_remedy(tmp_path: Path) -> None:
         InputError, match=r"stress.fatigue_limit_pa: asks for stress, and no part has elements .* Give the deck"
     ):
         ss.Study.from_file(study).run()
+
+
+def test_stress_is_exported_for_paraview_calculix_and_as_a_table(folder: Path, cantilever: Any) -> None:
+    import meshio
+
+    data = cantilever["forced_response"].isel(case=0)
+    files = cantilever.export("vtu", folder / "vtu", steps=1)
+    mesh = meshio.read(next(file for file in files if file.name == "stress.vtu"))
+    assert mesh.points == pytest.approx(data.stress_point.values)
+    assert mesh.cells_dict["triangle"].tolist() == data.stress_triangle.values.tolist()
+    for name, own in {
+        "static_stress_pa": data.static_stress,
+        "utilisation": data.utilisation,
+        "alternating_pa": data.alternating_stress,
+    }.items():
+        assert mesh.point_data[name] == pytest.approx(own.values, nan_ok=True)
+    assert (mesh.point_data["singular"] == (data.stress_at.values > 0)).all()
+
+    out = CliRunner().invoke(app, ["export", str(folder / "results"), "--to", "csv", "--out", str(folder / "csv")])
+    assert out.exit_code == 0, out.output
+    rows = list(csv.DictReader((folder / "csv" / "stress.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == data.sizes["stress_place"]
+    place = int(data.worst_place.values[0])
+    row = next(row for row in rows if int(row["node"]) == data.stress_node.values[place])
+    assert float(row["utilisation"]) == data.utilisation.values[place]
+    assert float(row["static_xy_pa"]) == data.static_stress.values[place, 3]
+    assert (row["part"], row["singular_at"], row["sector"]) == ("beam", "free", "0")
+
+    (file,) = cantilever.export("frd", folder / "frd", units="mm-t-s")
+    read_back = read_frd(file, units=Units.named("mm-t-s"))
+    tensor_of, margins = read_back.field("STRESS", 1), read_back.field("MARGIN", 1)
+    assert tensor_of.components == ("SXX", "SYY", "SZZ", "SXY", "SYZ", "SZX")
+    order = np.argsort(data.stress_node.values)
+    assert tensor_of.nodes.tolist() == data.stress_node.values[order].tolist()
+    assert tensor_of.values == pytest.approx(data.static_stress.values[order], rel=1e-5, abs=1e-3)
+    assert margins.components == ("ALTERN", "MEAN", "ALLOWED", "UTILIS")
+    assert margins.values[:, 3] == pytest.approx(np.nan_to_num(data.utilisation.values[order], nan=-1.0), rel=1e-5)
+    assert margins.values[:, 0] * 1e6 == pytest.approx(data.alternating_stress.values[order], rel=1e-5)
+    assert len(read_back.field("DISP", 1).nodes) > len(order)  # inner nodes and mid-side nodes have a motion alone
+
+
+def test_stress_away_from_the_peak_and_of_other_motions_is_not_written(
+    folder: Path, cantilever: Any, caplog: Any
+) -> None:
+    files = cantilever.export("vtu", folder / "off", hz=1.0, steps=1)
+    assert not any(file.name == "stress.vtu" for file in files)
+    with pytest.raises(
+        InputError, match=r"export: to: is csv, and this motion has no stress. Add the table \[stress\]"
+    ):
+        cantilever.export("csv", folder / "none", hz=1.0)
+
+
+def test_exported_stress_turns_with_the_sectors_of_a_wheel() -> None:
+    """Radial tension stays radial."""
+    radial = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    one = SurfaceFields(
+        ["disk"],
+        ["free"],
+        np.zeros(1, int),
+        np.ones(1, int),
+        np.array([[2.0, 0.0, 1.0]]),
+        np.zeros((0, 3), int),
+        radial[None],
+        {"utilisation": np.ones(1)},
+    )
+    wheel = one.turned(Axis(), 2 * np.pi / 8, 8)
+    assert wheel.sector.tolist() == list(range(8))
+    outward = wheel.points[:, :2] / 2
+    assert np.linalg.norm(outward, axis=1) == pytest.approx(1)
+    for way, own in zip(outward, wheel.static, strict=True):
+        normal = np.array([*way, 0.0])
+        assert tensor(own) @ normal == pytest.approx(normal)
+        assert np.trace(tensor(own)) == pytest.approx(1)
+
+
+def test_a_comparison_shows_the_utilisation(tmp_path: Path, folder: Path, cantilever: Any) -> None:
+    other = ss.Study.from_file(written(tmp_path, STUDY.replace("force_n = 100.0", "force_n = 150.0"))).run()
+    found = ss.compare(folder / "results", other, names=["light", "heavy"])
+    data = cantilever["forced_response"].isel(case=0)
+    used = found.peaks["utilisation"].to_numpy()
+    assert used == pytest.approx(data.utilisation.values[int(data.worst_place[0])] * np.array([1.0, 1.5]), rel=1e-3)
+    head, rows = found.peaks_in_words()
+    assert head[-1] == "utilisation"
+    assert rows[0][-1] == f"{used[0]:.3f}"

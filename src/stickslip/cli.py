@@ -194,8 +194,8 @@ def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")],
     *,
     to: Annotated[
-        Literal["vtu", "frd", "uff"],
-        typer.Option(help="vtu for ParaView, frd for CalculiX's viewer, uff for test software."),
+        Literal["vtu", "frd", "uff", "csv"],
+        typer.Option(help="vtu for ParaView, frd for CalculiX's viewer, uff for test software, csv: stress alone."),
     ] = "vtu",
     case: Annotated[int, typer.Option(min=0, help="Number of the case of \\[vary], from 0.")] = 0,
     hz: Annotated[

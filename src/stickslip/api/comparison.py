@@ -66,7 +66,7 @@ class Comparison:
 
     @property
     def peaks(self) -> pd.DataFrame:
-        """One row a case and design: the peak, and its difference from the first design (NaN if it lacks the case)."""
+        """One row a case and design: the peak, its difference from the first design (NaN if it lacks the case), and utilisation with [stress]."""
         divided = per_force(self.designs, self.curves)
         found = peak_rows(self.designs, divided=divided)
         if not found:
@@ -80,6 +80,8 @@ class Comparison:
             "against the first (%)": "off_percent",
             "shift (Hz)": "shift_hz",
         }
+        if any(not np.isnan(row.utilisation) for row in found):
+            columns["utilisation"] = "utilisation"
         return pd.DataFrame({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})
 
     @property

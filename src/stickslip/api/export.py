@@ -9,10 +9,11 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.readers.units import Units
-from stickslip.study.exchange.chosen import chosen
+from stickslip.study.exchange.chosen import Chosen, chosen
 from stickslip.study.exchange.contacts import contacts_of
 from stickslip.study.exchange.frd import write_frd
-from stickslip.study.exchange.motion import motion_of
+from stickslip.study.exchange.motion import Motion, motion_of
+from stickslip.study.exchange.stress import SurfaceFields, stress_fields, write_stress_csv, write_stress_vtu
 from stickslip.study.exchange.uff import write_uff
 from stickslip.study.exchange.vtu import write_vtu
 from stickslip.study.file.study import StudyFile, validated
@@ -22,8 +23,9 @@ from stickslip.study.own_code import OwnCode
 from stickslip.study.store.atomic_write import unwritable
 from stickslip.study.store.progress import LOG
 
-Format = Literal["vtu", "frd", "uff"]
+Format = Literal["vtu", "frd", "uff", "csv"]
 MOST_STEPS = 1000
+NO_STRESS = "Add the table [stress] to the study and run it: only the stress is computed then. Leave hz out: stress is that of the peak."
 IN_PYTHON = "A result imports no code. In Python: result.export(of=Study.from_file(path, allow_code=True).model())."
 
 
@@ -50,7 +52,7 @@ class Wanted:
             raise input_error("export: steps", f"is {self.steps}", remedy)
         if self.units != "SI" and self.to != "frd":
             what = f"is {self.units}, and only frd takes other units"
-            remedy = "Leave it out: vtu and uff are in m, N and Hz."
+            remedy = "Leave it out: the others are in m, N, Pa and Hz."
             raise input_error("export: units", what, remedy)
 
 
@@ -67,19 +69,37 @@ def export_result(
         raise input_error("export: wheel", "is asked of a single structure", remedy)
     motion = motion_of(picked, model, wheel=wanted.wheel)
     forced = tree[picked.analysis].to_dataset() if picked.point is not None else None
+    stress = None if forced is None else _stress(forced, picked, case, wanted, motion)
     name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"
     place = _place(path, f"{name}_wheel" if wanted.wheel else name, folder)
     count = sum(len(body.nodes.points) for body in motion.bodies)
     sectors = f" of {motion.sectors} sectors" if motion.sectors > 1 else ""
+    if wanted.to == "csv":
+        if stress is None:
+            raise input_error("export: to", "is csv, and this motion has no stress", NO_STRESS)
+        LOG.info(f"writing the stress of {len(stress.points)} nodes{sectors} to {place}")
+        return (write_stress_csv(stress, place / "stress.csv"),)
     LOG.info(f"writing {count} nodes{sectors} to {place}")
     if wanted.to == "vtu":
         contacts = (
             contacts_of(forced, motion, case, picked.point) if forced is not None and picked.point is not None else ()
         )
-        return write_vtu(motion, contacts, place, wanted.steps)
+        files = write_vtu(motion, contacts, place, wanted.steps)
+        return files if stress is None else (write_stress_vtu(stress, place / "stress.vtu"), *files)
     if wanted.to == "frd":
-        return (write_frd(motion, place / "motion.frd", units),)
+        return (write_frd(motion, place / "motion.frd", units, stress),)
     return (write_uff(motion, forced, case, place / "motion.uff"),)
+
+
+def _stress(forced: xr.Dataset, picked: Chosen, case: int, wanted: Wanted, motion: Motion) -> SurfaceFields | None:
+    """Return the stress of the motion to write; None where the result has none of this motion."""
+    found = stress_fields(forced, case)
+    if found is None or wanted.to == "uff":
+        return None
+    if picked.point != int(forced["peak_point"].values[case]):
+        LOG.info("the stress of the result is that of the peak: it is not written with another point")
+        return None
+    return found.turned(motion.axis, motion.pitch, motion.sectors)
 
 
 def _place(path: Path | None, name: str, folder: Path | None) -> Path:

@@ -143,7 +143,7 @@ class Result:
         to
             ``vtu``: one period as a series of files for ParaView (open ``motion.pvd`` and ``contacts.pvd``), and all harmonics in
             ``harmonics.vtu``; ``frd``: harmonics for CalculiX's viewer; ``uff``: deflection shapes and response functions for test
-            software.
+            software; ``csv``: a table of the stress at the peak. With ``[stress]``, vtu (``stress.vtu``) and frd have it, too.
         folder
             Created if missing; left out: a folder such as ``vtu_0`` or ``vtu_0_wheel`` beside the result's file.
         case

@@ -11,6 +11,7 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.compared.designs import Design, MeasuredCurve, differences, per_force
 from stickslip.analyses.forced_response.page.many_cases import FEW
 from stickslip.analyses.forced_response.page.response import Response
+from stickslip.analyses.forced_response.verdicts.margin import utilisation_of
 from stickslip.analyses.limit_cycle.page import SECTION as LIMIT_CYCLES
 from stickslip.analyses.limit_cycle.page import cycle_table
 from stickslip.analyses.nonlinear_mode.page import SECTION as MODES
@@ -385,7 +386,10 @@ def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
 
 @dataclass(frozen=True)
 class PeakRow:
-    """The peak of a case of a design, in Hz and SI units, and its difference from the first design (NaN if it lacks the case)."""
+    """The peak of a case of a design, in Hz and SI units, and its difference from the first design (NaN if it lacks the case).
+
+    NaN as well is the utilisation of the fatigue limit at its worst place, where none is told.
+    """
 
     case: str
     design: str
@@ -394,6 +398,7 @@ class PeakRow:
     level: str
     off_percent: float
     shift_hz: float
+    utilisation: float
 
 
 def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
@@ -410,7 +415,8 @@ def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
             if design is not first and like is not None and _same_load(case.excitation, like.excitation):
                 off = over_first(height, _peak(of_first, like, divided=divided))
                 shift = hz - of_first.peak_hz(like)
-            found.append(PeakRow(like_case.label, design.name, hz, height, response.level(case), off, shift))
+            used = utilisation_of(response.data, case.index)
+            found.append(PeakRow(like_case.label, design.name, hz, height, response.level(case), off, shift, used))
     return found
 
 
@@ -421,8 +427,9 @@ def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
         return None
     unit, cells = column(np.array([p.height for p in found]), unit_of(designs, divided=divided))
     head = ["case", "design", f"peak ({unit})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]
+    stressed = any(not np.isnan(p.utilisation) for p in found)
     return Table(
-        head,
+        [*head, *["utilisation"] * stressed],
         [
             [
                 p.case or NONE,
@@ -432,6 +439,7 @@ def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
                 p.level or NONE,
                 fixed(p.off_percent, 2),
                 fixed(p.shift_hz, 3),
+                *[number(p.utilisation, 3)] * stressed,
             ]
             for p, cell in zip(found, cells, strict=True)
         ],

@@ -59,6 +59,14 @@ def worst_of(own: SurfaceStress) -> Place | None:
     return next(iter(places_of(own, own.worst_place[:1])), None)
 
 
+def utilisation_of(data: xr.Dataset, case: int) -> float:
+    """Return the utilisation of the worst place of a case; NaN without stress, or above yield."""
+    if not holds(SurfaceStress, data):
+        return float("nan")
+    place = worst_of(read(SurfaceStress, data, case))
+    return float("nan") if place is None else place.utilisation
+
+
 def size_of(value: float) -> str:
     """Return a stress as text in MPa."""
     return f"{value / MPA:.4g} MPa"
