@@ -91,6 +91,7 @@ def test_an_integration_ends_where_the_motion_rings_on(factor: float, least: int
         (190007, 34),  # two pairs of multipliers meet
         (190008, 25),
         (190008, 38),  # two motions within 0.6 %, of which the judge takes the nearer
+        (190037, 19),  # the motion in time ends on the stable one of two 0.4 % apart
         (190014, 21),  # a peak with few harmonics beside motions that were confirmed with more
     ],
 )

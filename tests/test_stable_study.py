@@ -53,7 +53,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
 from stickslip.response.stability.found import Floquet
-from stickslip.response.stability.missing_harmonics import with_more
+from stickslip.response.stability.missing_harmonics import solved_with, with_more
 from stickslip.response.stability.multipliers import Settled
 from stickslip.response.system import System
 from stickslip.response.time.sectors import sectors_in_time
@@ -504,13 +504,34 @@ CHECK = Check(180.0, 1.02e-3, 1e-3, settled=True, periods=90, order=5, refined=1
 
 @pytest.mark.parametrize(
     ("motion", "verdict"),
-    [("attained", "stable"), ("left", "unstable"), ("not periodic", "unstable"), ("not settled", "undecided")],
+    [
+        ("attained", "stable"),
+        ("next to it", "undecided"),
+        ("left", "unstable"),
+        ("not periodic", "unstable"),
+        ("not settled", "undecided"),
+    ],
 )
 def test_motions_in_time_decide(motion: str, verdict: str) -> None:
     found = with_motion(EXAMINED, replace(CHECK, motion=motion, scatter=0.02))  # type: ignore[arg-type]
     assert (found.verdict, found.motion) == (verdict, motion)
     settled = replace(EXAMINED, verdict="stable")
     assert with_motion(settled, replace(CHECK, motion=motion)) == settled  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("away", "same"), [(0.0, True), (0.3, True), (0.5, False), (2.0, False)])
+def test_a_balance_that_comes_no_nearer_to_the_motion_in_time_is_another_motion(away: float, same: bool) -> None:
+    """Away: distance of the motion in time from the balance with more harmonics, over the change by these; 1 is the balance itself."""
+    asked = lifted(omega_range=(1.29, 1.6), direction="down", low=1, high=1, points=12)
+    point = response_of(asked).top.point  # type: ignore[union-attr]
+    more = solved_with(asked.problem, point, 2 * point.order + 3)
+    assert more is not None
+    linear, outputs = asked.problem.low.linear, asked.model.system.outputs
+    few, many = (linear.recover(p.omega, p.coefficients)[:, outputs] for p in (point, more.point))
+    few = np.pad(few, ((0, len(many) - len(few)), (0, 0)))
+    assert np.linalg.norm(few - many) > 2e-3 * np.linalg.norm(many)
+    found = SimpleNamespace(settled=True, harmonics=many + away * (few - many))
+    assert in_time._approached(asked, point, found) == same  # type: ignore[arg-type]
 
 
 def test_a_model_too_large_in_time_is_not_sent_there() -> None:

@@ -387,6 +387,12 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
         {TOP: "doubtful"},
         "it wanders by 0.6 %",
     ),
+    "next to it": (
+        checked(motion="next to it", difference_percent=-0.3),
+        "doubtful",
+        {TOP: "doubtful"},
+        "ends on another motion -0.3 % away",
+    ),
     "not settled": (checked(settled=0), "doubtful", {TOP: "doubtful"}, "did not settle"),
     "attained": (checked(motion="attained"), "trusted", {}, "attained in time integration"),
     "attained, though something rings": (

@@ -461,7 +461,7 @@ class TimeChecks:
     )
     verify_motion: TextArray = column(
         "1",
-        "attained, left, not periodic or not settled: what the motion in time did that began with the balance's state",
+        "attained, next to it, left, not periodic or not settled: what the motion in time did that began with the balance's state",
         along="check",
     )
     verify_refined: FloatArray = column(

@@ -15,7 +15,13 @@ from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.forced.amplitude import amplitudes
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
-from stickslip.response.stability.missing_harmonics import MOST_ROWS, with_more
+from stickslip.response.stability.missing_harmonics import (
+    HARMONICS_FACTOR,
+    HARMONICS_MORE,
+    MOST_ROWS,
+    solved_with,
+    with_more,
+)
 from stickslip.response.system import System
 from stickslip.response.time.sectors import all_sectors, sectors_in_time
 from stickslip.response.time.start import TransientStart, start_from_harmonics
@@ -28,9 +34,10 @@ PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, un
 LARGE = 1.0  # percent, above which the balance is repeated with more harmonics to find the cause of the difference
 STEPS = 1024  # time steps of a period
 
-Motion = Literal["attained", "left", "not periodic", "not settled"]
+Motion = Literal["attained", "next to it", "left", "not periodic", "not settled"]
 TOLD: dict[str, str] = {
     "attained": "attained: the motion in time stays on the balanced motion",
+    "next to it": "next to it: the motion in time ends next to the balanced motion, which comes no nearer with more harmonics",
     "left": "left: the motion in time leaves the balanced motion",
     "not periodic": "the motion in time does not repeat with the period of the load",
     "not settled": "where the motion in time goes is not known yet",
@@ -73,8 +80,8 @@ class Check:
     refined_order, refined
         Highest harmonic and amplitude of a balance repeated with more harmonics; NaN if not needed or failed.
     motion
-        Outcome of an integration from the balance's state: it *attained* that motion, *left* it for another one or without bound, is *not
-        periodic*, or has *not settled*.
+        Outcome of an integration from the balance's state: it *attained* that motion, ended on another one *next to it*, *left* it for one far
+        away or without bound, is *not periodic*, or has *not settled*.
     shows_after
         Periods in which a disturbance changes a thousandfold by the multiplier; 0 if not requested.
     """
@@ -190,6 +197,9 @@ STEP_FLOPS = 2e4  # operations that last as long as a step of the smallest syste
 RAISED = (9, 15, 21, 31, 41)  # highest harmonics of a balance that starts from the motion in time
 RAISED_AGREE = 0.5  # its difference from that motion over the tolerated error
 RAISED_APART = 0.2  # its difference from the point as solved: two masses on stiff contacts, H = 5, 0.16; another motion is farther away
+APPROACH = 0.5  # largest ratio of distances from the motion in time, after and before the harmonics are doubled
+SAME_RTOL = 1e-3  # distance from the motion in time that its steps may make, 1024 a period
+MAX_APPROACH_ROWS = 1000  # of the balance solved for this comparison
 MOST_STEPS = 8 * STEPS  # steps are doubled as long as this changes the motion by more than `LARGE`
 
 
@@ -268,8 +278,30 @@ def check_in_time(
         fine = _compared(question, response, point, finer, steps)
         if motion_of(fine, finer) != motion:
             check = replace(fine, refined_order=check.refined_order, refined=check.refined)
-            motion = motion_of(fine, finer)
+            motion, found = motion_of(fine, finer), finer
+    if motion == "attained" and multiplier is not None and multiplier > 1.0 and not _approached(question, point, found):
+        motion = "next to it"
     return replace(check, motion=motion, shows_after=after), None
+
+
+def _approached(question: Question, point: ForcedPoint, found: TransientResult) -> bool:
+    """Whether the balance with more harmonics comes nearer to the motion in time; also if it is near, large, or not found.
+
+    Of two periodic motions within a percent, one stable and one unstable, the motion in time ends on the stable one. A balance of the
+    unstable one stays as far away with more harmonics.
+    """
+    problem, system = question.problem, question.model.system
+    known = _known(found)
+
+    def off(one: ForcedPoint) -> float:
+        return _of_outputs(problem, known, problem.low.linear.recover(one.omega, one.coefficients)[:, system.outputs])
+
+    before = off(point)
+    order = HARMONICS_FACTOR * point.order + HARMONICS_MORE
+    if before <= SAME_RTOL or system.retained.size * (2 * order + 1) > MAX_APPROACH_ROWS:
+        return True
+    more = solved_with(problem, point, order)
+    return more is None or off(more.point) <= max(SAME_RTOL, APPROACH * before)
 
 
 def balance_from_time(

@@ -450,6 +450,10 @@ def in_time(case: Curve) -> Iterator[Finding]:
             why = f"the motion in time, started from it, {what}: {without_place(str(said.verify_sentence))}"
             remedy = "Believe the time integration; sweep the other way for the motion it goes to."
             yield Finding("wrong", why, remedy, (point,))
+        elif motion == "next to it":
+            why = f"the motion in time ends on another motion {off:+.2g} % away, to which more harmonics do not lead"
+            remedy = "The table of checks compares both; --verify at this frequency alone integrates for longer."
+            yield Finding("doubtful", why, remedy, (point,))
         elif motion == "not settled":
             why = "a time integration did not settle to a periodic motion"
             remedy = "The table of checks says what drifts or rings on."
