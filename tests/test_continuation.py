@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from closed_curves import CUBIC as FOLD
+from closed_curves import At, Curve, corner, wall
 
 from stickslip.solve.continuation import Following, StepControl, advance, reversed_point, start_point, step_to, trace
 from stickslip.solve.newton_method import Newton
@@ -12,32 +14,7 @@ from stickslip.solve.status import Status
 NEWTON = Newton(tolerance=1e-12)
 
 
-@dataclass(frozen=True, eq=False)
-class At:
-    residual: np.ndarray
-    jac: np.ndarray
-    jac_p: np.ndarray
-    seconds_contact: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """x ↦ f(x, p) with derivatives, for two unknowns: the second one is 1 and gives the first a size to be measured by."""
-
-    f: object
-    f_x: object
-    f_p: object
-
-    def linearise(self, x, p):
-        return At(
-            np.array([self.f(x[0], p), x[1] - 1.0]),
-            np.array([[self.f_x(x[0], p), 0.0], [0.0, 1.0]], order="F"),
-            np.array([self.f_p(x[0], p), 0.0]),
-        )
-
-
 CIRCLE = Curve(lambda x, p: x * x + p * p - 1, lambda x, _: 2 * x, lambda _, p: 2 * p)
-FOLD = Curve(lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0)  # folds at x = ±1/√3
 
 
 def along(control, newton=NEWTON):
@@ -121,11 +98,6 @@ def test_a_reversed_branch_comes_back_to_its_start():
 
 
 # ---- corners ------------------------------------------------------------------------------------------------------------
-
-
-def corner(slope):
-    """p = 1 - slope |x|, as contact laws make them; from slope 1 on the branch turns by more than a right angle."""
-    return Curve(lambda x, p: p - 1 + slope * abs(x), lambda x, _: slope * (1.0 if x > 0 else -1.0), lambda _x, _p: 1.0)
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.4, 0.6, 1.0, 2.0, 5.0, 20.0])
@@ -248,9 +220,6 @@ def test_duffing_lies_on_its_closed_form():
 
 def test_step_too_small_where_the_curve_ends():
     # x = sqrt(1 - p) drawn with a wall: beyond p = 0.5 the residual is not a number
-    def wall(x, p):
-        return x - 1.0 if p < 0.5 else np.nan
-
     curve = Curve(wall, lambda _x, _p: 1.0, lambda _x, _p: 0.0)
     _, points = follow(curve, 1.0, 0.0, 1.0, StepControl(scale=1.0))
     assert points[-1].solution.status is Status.STEP_TOO_SMALL

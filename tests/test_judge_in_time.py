@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from transient_models import GRIFFIN_EXACT, load_of, structure_of
+from transient_models import GRIFFIN_EXACT, bounce, griffin, load_of, structure_of
 
 import evidence.integrator
 from evidence.integrator import time_step
 from evidence.integrator.propagator import step_operators
-from evidence.integrator.transient import TimeStepping, TransientResult, TransientStart, integrate
+from evidence.integrator.transient import TimeStepping, TransientStart, integrate
 from evidence.models.solving import integrate_refined
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
@@ -29,56 +29,19 @@ def test_it_refuses_laws_that_it_has_no_step_for() -> None:
         integrate(structure, gap, [Jenkins(k_t=1.0, limit=1.0)], load_of(1, {}), 1.0, np.array([0]))
 
 
-def griffin(omega: float, stepping: TimeStepping) -> TransientResult:
-    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
-    structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
-    gap = np.array([[1.0], [0.0], [0.0]])
-    return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
-
-
 @pytest.mark.validation
 @pytest.mark.parametrize("omega", GRIFFIN_EXACT)
 def test_friction_damped_oscillator_against_exact_event_driven_values(omega: float) -> None:
-    result = griffin(omega, TimeStepping(steps_per_period=2048, tolerance=1e-8))
+    result = griffin(integrate, omega, TimeStepping(steps_per_period=2048, tolerance=1e-8))
     assert result.settled
     assert result.contact_failures == 0
     assert abs(result.harmonics[1, 0]) == pytest.approx(GRIFFIN_EXACT[omega], rel=5e-6)
 
 
-def bounce(steps: int) -> float:
-    """Largest error over a period, relative to the drop, of a mass that bounces on a unilateral spring."""
-    mass, k, weight, speed = 0.5, 2e4, 4.0, 0.8
-    gravity, own = weight / mass, np.sqrt(k / mass)
-    sag = weight / k
-    amplitude = np.hypot(sag, speed / own)
-    touch = 2 / own * (np.pi - np.arctan2(speed / own, sag))  # duration of the contact
-    flight = 2 * speed / gravity
-    period = touch + flight
-    structure = structure_of(mass * np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)))
-    law = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=k, mu=0.0)
-    start = TransientStart(np.zeros(1), np.array([speed]), np.zeros((1, 2)))
-    result = integrate(
-        structure,
-        np.array([[0.0], [0.0], [1.0]]),
-        [law],
-        load_of(1, {}, [-weight]),
-        2 * np.pi / period,
-        np.array([0]),
-        start,
-        TimeStepping(steps_per_period=steps, max_periods=2),
-    )
-    t = period * np.arange(1, steps + 1) / steps
-    since = t - flight
-    exact = np.where(
-        t < flight, speed * t - gravity * t**2 / 2, -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi)
-    )
-    return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
-
-
 @pytest.mark.validation
 def test_bouncing_mass_follows_parabola_and_half_sine() -> None:
     # Closed form over two landings; an error in a landing would shift all that comes after it.
-    errors = np.array([bounce(n) for n in (250, 1000, 4000)])
+    errors = np.array([bounce(integrate, n, TransientStart, TimeStepping) for n in (250, 1000, 4000)])
     assert errors[0] < 2e-2
     assert np.all(errors[1:] < errors[:-1] / 8)  # second order would be 16, at unlucky phases less
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from solid_models import rigid_motions, without_sets
 
 from stickslip.errors import InputError
 from stickslip.model.damping import rayleigh_damping
@@ -38,19 +39,9 @@ def prism(size, cells, bulge=0.0):
     return SolidMesh(points, cells10, {"root": root, "tip": np.array([len(points) - 1])})
 
 
-def unclamped(mesh):
-    return SolidMesh(mesh.points, mesh.cells, {})
-
-
-def rigid_motions(points):
-    shifts = np.tile(np.eye(3), (len(points), 1))
-    turns = np.stack([np.cross(axis, points).ravel() for axis in np.eye(3)], axis=1)
-    return np.hstack([shifts, turns])
-
-
 @pytest.mark.parametrize("bulge", [0.0, 0.01])
 def test_free_body_has_six_motions_without_strain(bulge):
-    mesh = unclamped(prism((0.03, 0.02, 0.04), (2, 1, 3), bulge))
+    mesh = without_sets(prism((0.03, 0.02, 0.04), (2, 1, 3), bulge))
     solid = assemble_solid(mesh, STEEL)
     motion = rigid_motions(mesh.points)
     force = solid.stiffness @ motion
@@ -62,7 +53,7 @@ def test_free_body_has_six_motions_without_strain(bulge):
 
 def test_mass_and_inertia_of_a_box():
     size = np.array([0.03, 0.02, 0.04])
-    mesh = unclamped(prism(size, (2, 1, 3)))
+    mesh = without_sets(prism(size, (2, 1, 3)))
     solid = assemble_solid(mesh, STEEL)
     centred = SolidMesh(mesh.points - size / 2, mesh.cells, {})
     motion = rigid_motions(centred.points)
@@ -74,7 +65,7 @@ def test_mass_and_inertia_of_a_box():
 
 def test_uniform_strain_has_the_energy_of_hookes_law():
     size = (0.03, 0.02, 0.04)
-    mesh = unclamped(prism(size, (2, 1, 3)))
+    mesh = without_sets(prism(size, (2, 1, 3)))
     solid = assemble_solid(mesh, STEEL)
     gradient = np.random.default_rng(0).standard_normal((3, 3))
     strain = (gradient + gradient.T) / 2
@@ -89,7 +80,7 @@ def test_blade_pair_has_the_mass_of_its_volume():
     mesh = mesh_blade_pair(pair, FlatCurvedDamper().contact_points())
     corner = mesh.points[mesh.cells[:, :4]]
     volume = np.linalg.det(corner[:, 1:] - corner[:, :1]).sum() / 6
-    solid = assemble_solid(unclamped(mesh), STEEL)
+    solid = assemble_solid(without_sets(mesh), STEEL)
     along = np.tile([0.0, 1.0, 0.0], len(mesh.points))
     assert along @ (solid.mass @ along) == pytest.approx(STEEL.density * volume, rel=1e-12)
     box = pair.foot_width * pair.foot_depth * pair.foot_height

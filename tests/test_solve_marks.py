@@ -1,10 +1,11 @@
 """Folds and marks located on known curves; parametrisations and predictors that agree on where a branch leads."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_curves import CUBIC, Curve, corner, wall
 
 from stickslip.errors import InputError
 from stickslip.solve.branch import Following, StepControl, reversed_point
@@ -18,37 +19,7 @@ TOLERANCE = 1e-12
 WAYS = [("arc_length", "tangent"), ("arc_length", "secant"), ("local", "tangent"), ("local", "secant")]
 
 
-@dataclass(frozen=True, eq=False)
-class At:
-    residual: np.ndarray
-    jac: np.ndarray
-    jac_p: np.ndarray
-    seconds_contact: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """f(x, p) = 0, beside a second unknown that is 1 and gives the first a size to be measured by."""
-
-    f: object
-    f_x: object
-    f_p: object
-
-    def linearise(self, x, p):
-        return At(
-            np.array([self.f(x[0], p), x[1] - 1.0]),
-            np.array([[self.f_x(x[0], p), 0.0], [0.0, 1.0]], order="F"),
-            np.array([self.f_p(x[0], p), 0.0]),
-        )
-
-
-CUBIC = Curve(lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0)
 FOLDS = [(-1 / np.sqrt(3), 2 / np.sqrt(27)), (1 / np.sqrt(3), -2 / np.sqrt(27))]
-
-
-def corner(slope):
-    """p = 1 - slope |x|: a fold that is a corner."""
-    return Curve(lambda x, p: p - 1 + slope * abs(x), lambda x, _: slope * (1.0 if x > 0 else -1.0), lambda _x, _p: 1.0)
 
 
 def along(parametrisation="arc_length", predictor="tangent", linear=None, **control):
@@ -286,9 +257,6 @@ def test_backward_is_forward_reversed():
 
 
 def test_a_step_that_had_to_be_shortened_is_counted():
-    def wall(x, p):
-        return x - 1.0 if p < 0.5 else np.nan
-
     problem = Curve(wall, lambda _x, _p: 1.0, lambda _x, _p: 0.0)
     following = along(first=0.25)
     start = begin(problem, 1.0, 0.0, following)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from transient_models import GRIFFIN_EXACT, load_of, structure_of, stuck_motion, wedge
+from transient_models import GRIFFIN_EXACT, bounce, griffin, load_of, structure_of, stuck_motion, wedge
 
 from evidence.integrator import transient as judge
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -14,14 +14,7 @@ from stickslip.model.matrices import lumped
 from stickslip.response.time.settling import LONGEST_MEMORY, remaining_change
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.response.time.stepping.marcher import prepared
-from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
-
-
-def griffin(omega: float, stepping: TimeStepping) -> TransientResult:
-    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
-    structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
-    gap = np.array([[1.0], [0.0], [0.0]])
-    return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
+from stickslip.response.time.transient import TimeStepping, integrate
 
 
 def test_linear_response_with_coupled_damping_and_a_stiff_mode_is_exact_at_a_coarse_step() -> None:
@@ -56,7 +49,7 @@ def test_free_rigid_body_follows_newton() -> None:
 
 @pytest.mark.parametrize("omega", GRIFFIN_EXACT)
 def test_friction_damped_oscillator_against_exact_event_driven_values(omega: float) -> None:
-    result = griffin(omega, TimeStepping(steps_per_period=2048, tolerance=1e-8))
+    result = griffin(integrate, omega, TimeStepping(steps_per_period=2048, tolerance=1e-8))
     assert result.settled
     assert result.contact_failures == 0
     # 2048 steps: error of the step up to 2.3e-6 in the order test below; the reference has eight digits.
@@ -69,7 +62,9 @@ def test_error_of_the_contact_force_is_of_second_order_in_the_step() -> None:
     def mean_error(steps: range) -> float:
         stepping = [TimeStepping(steps_per_period=n, tolerance=1e-7) for n in steps]
         errors = [
-            abs(griffin(w, s).harmonics[1, 0]) / exact - 1 for s in stepping for w, exact in GRIFFIN_EXACT.items()
+            abs(griffin(integrate, w, s).harmonics[1, 0]) / exact - 1
+            for s in stepping
+            for w, exact in GRIFFIN_EXACT.items()
         ]
         return float(np.sqrt(np.mean(np.square(errors))))
 
@@ -131,39 +126,9 @@ def test_work_of_the_load_is_what_dashpots_and_friction_dissipate() -> None:
     assert dashpots + np.sum(contact) == pytest.approx(work, rel=3e-4)
 
 
-def bounce(steps: int) -> float:
-    """Largest error over a period, relative to the drop, of a mass that bounces on a unilateral spring."""
-    mass, k, weight, speed = 0.5, 2e4, 4.0, 0.8
-    gravity, own = weight / mass, np.sqrt(k / mass)
-    sag = weight / k
-    amplitude = np.hypot(sag, speed / own)
-    touch = 2 / own * (np.pi - np.arctan2(speed / own, sag))  # duration of the contact
-    flight = 2 * speed / gravity
-    period = touch + flight
-    structure = structure_of(mass * np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)))
-    law = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=k, mu=0.0)
-    start = TransientStart(np.zeros(1), np.array([speed]), np.zeros((1, 2)))
-    result = integrate(
-        structure,
-        np.array([[0.0], [0.0], [1.0]]),
-        [law],
-        load_of(1, {}, [-weight]),
-        2 * np.pi / period,
-        np.array([0]),
-        start,
-        TimeStepping(steps_per_period=steps, max_periods=2),
-    )
-    t = period * np.arange(1, steps + 1) / steps
-    since = t - flight
-    exact = np.where(
-        t < flight, speed * t - gravity * t**2 / 2, -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi)
-    )
-    return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
-
-
 def test_bouncing_mass_follows_parabola_and_half_sine() -> None:
     # Closed form over two landings; an error in a landing would shift all that comes after it.
-    errors = np.array([bounce(n) for n in (250, 1000, 4000)])
+    errors = np.array([bounce(integrate, n, TransientStart, TimeStepping) for n in (250, 1000, 4000)])
     assert errors[0] < 2e-2
     assert np.all(errors[1:] < errors[:-1] / 8)  # second order would be 16, at unlucky phases less
 
@@ -258,7 +223,7 @@ def test_residual_traction_is_the_start_of_the_springs() -> None:
 
 
 def test_periods_that_run_out_are_said_to_be_unsettled() -> None:
-    result = griffin(1.15, TimeStepping(steps_per_period=64, max_periods=12))
+    result = griffin(integrate, 1.15, TimeStepping(steps_per_period=64, max_periods=12))
     assert result.status == "unsettled"
     assert not result.settled
     assert result.periods == 12

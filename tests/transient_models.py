@@ -1,6 +1,8 @@
 """Models of the time integration and of shooting, with exact values."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,46 @@ def structure_of(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -
 def load_of(n: int, harmonics: dict[int, list[complex]], static: list[float] | None = None) -> HarmonicLoad:
     amplitudes = {h: np.array(f, dtype=complex) for h, f in harmonics.items()}
     return HarmonicLoad(np.zeros(n) if static is None else np.array(static, dtype=float), amplitudes)
+
+
+def griffin(integrate: Callable[..., Any], omega: float, stepping: Any) -> Any:
+    """The oscillator of `GRIFFIN_EXACT`, by one of the integrators."""
+    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)
+    structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
+    gap = np.array([[1.0], [0.0], [0.0]])
+    return integrate(structure, gap, [law], load_of(1, {1: [0.1]}), omega, np.array([0]), stepping=stepping)
+
+
+def bounce(integrate: Callable[..., Any], steps: int, start: type[Any], stepping: type[Any]) -> float:
+    """Largest error over a period, relative to the drop, of a mass that bounces on a unilateral spring.
+
+    `start` and `stepping` are the classes of an integrator for its start and its time steps.
+    """
+    mass, k, weight, speed = 0.5, 2e4, 4.0, 0.8
+    gravity, own = weight / mass, np.sqrt(k / mass)
+    sag = weight / k
+    amplitude = np.hypot(sag, speed / own)
+    touch = 2 / own * (np.pi - np.arctan2(speed / own, sag))  # duration of the contact
+    flight = 2 * speed / gravity
+    period = touch + flight
+    structure = structure_of(mass * np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)))
+    law = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=k, mu=0.0)
+    result = integrate(
+        structure,
+        np.array([[0.0], [0.0], [1.0]]),
+        [law],
+        load_of(1, {}, [-weight]),
+        2 * np.pi / period,
+        np.array([0]),
+        start(np.zeros(1), np.array([speed]), np.zeros((1, 2))),
+        stepping(steps_per_period=steps, max_periods=2),
+    )
+    t = period * np.arange(1, steps + 1) / steps
+    since = t - flight
+    exact = np.where(
+        t < flight, speed * t - gravity * t**2 / 2, -sag + amplitude * np.cos(own * (since - touch / 2) + np.pi)
+    )
+    return float(np.max(np.abs(result.outputs[:, 0] - exact)) / (speed**2 / (2 * gravity)))
 
 
 def wedge() -> tuple[Structure, FloatArray, list[ElasticCoulomb], HarmonicLoad]:
