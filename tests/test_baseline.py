@@ -144,6 +144,15 @@ def test_a_table_of_the_terminal_is_the_same_whatever_its_time_makes_of_its_widt
     ]
 
 
+def test_lines_of_a_job_that_lasts_and_times_of_a_slow_machine_do_not_count():
+    slow = [
+        "  forced response 40 %: stability, point 14: 26.87 Hz, 1 min 3 s",
+        "  response 40 %",
+        "peak 1 mm (1.09 ks)",
+    ]
+    assert terminal_lines("\n".join(slow)) == terminal_lines("peak 1 mm (0.4 s)")
+
+
 def test_data_of_figures_and_columns_beside_a_time_count():
     page = "<table><tr><th>time (s)</th><th>peak</th></tr><tr><td>{}</td><td>{}</td></tr></table><script>draw([{}])</script>"
     assert page_lines(page.format(1, 2, 3)) == page_lines(page.format(9, 2, 3))

@@ -10,12 +10,12 @@ MAX_LINES = 40  # of a difference that is printed
 MAX_LETTERS = 240  # of a line that is printed
 
 # How long something took, as the command, its log and its page say it.
-_SECONDS = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+-]?\d+)? (?:s|ms|min|hours|days)\b")
+_SECONDS = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+-]?\d+)? (?:k?s|ms|min|hours|days)\b")
 _STAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\+00:00|Z)?")
 _VERSION = re.compile(r"(stickslip )\d+(?:\.\d+)+[\w.+]*")
 _SHARES = re.compile(r"(: )[\d.]+ % in the contact laws, [\d.]+ % in linear algebra, [\d.]+ % in the rest")
 _COMPILED = re.compile(r"compil(?:ing|ed) (?:the )?contact laws")
-_PROGRESS = re.compile(r"^  .* \d+ %$")  # a line a minute of a job that lasts
+_PROGRESS = re.compile(r"^  .*(?: \d+ %|, (?:\d+ min )?\d+ s)$")  # a line a minute of a job that lasts
 # the heads of columns that hold such times
 _TIMED = re.compile(r"^(?:(?:contact|linear|rest|time) \(s\)|seconds)$")
 
