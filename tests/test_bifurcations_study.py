@@ -9,11 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.analyses.forced_response.records.points import collect
 from stickslip.analyses.forced_response.stability import bifurcating
 from stickslip.analyses.forced_response.stability.bifurcating import limits, located
 from stickslip.cli import app
 from stickslip.errors import InputError
+from stickslip.response.forced.collected import collect
 from stickslip.response.forced.response import forced_response
 from stickslip.study.models.study import read_study
 from stickslip.study.store.netcdf import read_tree

@@ -33,7 +33,6 @@ from stickslip.model import blas_threads
 from stickslip.study.check import SECTIONS
 from stickslip.study.file.example import Kind, example_text
 from stickslip.study.outcome import Outcome
-from stickslip.study.store import threads
 from stickslip.study.store.folder import locked_folder
 from stickslip.study.store.progress import Interrupted
 
@@ -46,8 +45,8 @@ HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skf
 @pytest.mark.parametrize("said", [{}, {"OMP_NUM_THREADS": "4"}, {"OPENBLAS_NUM_THREADS": "2"}])
 def test_a_run_gives_blas_one_thread_unless_told_otherwise(monkeypatch, said):
     environment = dict(said)
-    monkeypatch.setattr(threads.os, "environ", environment)
-    threads.one_blas_thread()
+    monkeypatch.setattr(blas_threads.os, "environ", environment)
+    blas_threads.one_blas_thread()
     one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     assert environment == (said or one)
 

@@ -8,14 +8,13 @@ import scipy.signal
 from test_run_up import LUMPED
 
 import stickslip as ss
-from stickslip.analyses.run_up.analysis import neglected
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Dofs, Structure
-from stickslip.response.rotating.envelope import SweepInTime, envelope
+from stickslip.response.rotating.envelope import SweepInTime, envelope, neglected
 from stickslip.response.system import System
 from stickslip.study.analysis import named
 from stickslip.units import RPM

@@ -36,8 +36,8 @@ from stickslip.model.readers.frd import read_frd
 from stickslip.model.readers.units import Units
 from stickslip.reduction.choice import Reduction
 from stickslip.study.exchange.chosen import chosen, point_of
-from stickslip.study.exchange.contacts import contacts_of
 from stickslip.study.exchange.motion import expanded, motion_of
+from stickslip.study.exchange.vtu import contacts_of
 
 pytestmark = pytest.mark.usefixtures("peak_alone")
 

@@ -330,7 +330,7 @@ def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_
     assert 0 < np.count_nonzero(own > 0.01) < own.size
     doubted = ["are predicted to change it by" in text for text in data.verdict_reason.values.tolist()]
     np.testing.assert_array_equal(doubted, own > 0.01)
-    monkeypatch.setattr("stickslip.analyses.forced_response.records.points.own_error", lambda *_: float("nan"))
+    monkeypatch.setattr("stickslip.response.forced.collected.own_error", lambda *_: float("nan"))
     data = dataset(solved(asked))
     assert np.all(data.verdict.values >= 1)
     assert data.verdict_reason[0].item().startswith("the error of H = ")

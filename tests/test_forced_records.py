@@ -220,13 +220,13 @@ def test_changes_of_the_peak_with_more_modes_and_fewer_points(monkeypatch: pytes
     model = SimpleNamespace(system=own, load=None)
     point = SimpleNamespace(converged=True, coefficients=np.zeros((2, 4)))
     monkeypatch.setattr(model_change, "replace", lambda p, **_: p)
-    monkeypatch.setattr(model_change, "_with_few_harmonics", lambda _, p: p)
+    monkeypatch.setattr(model_change, "with_few_harmonics", lambda _, p: p)
     monkeypatch.setattr(model_change, "_richer", lambda _: ("richer", None))
     monkeypatch.setattr(model_change, "_coarser", lambda _: (fewer, 7))
     peaks = {id(own): at(2.0, 100.0), id("richer"): at(2.2, 101.0), id(fewer): at(1.9, 98.0)}
-    monkeypatch.setattr(model_change, "_found", lambda _, system, *__: peaks[id(system)])
+    monkeypatch.setattr(model_change, "peak_near", lambda system, *_: peaks[id(system)])
     response: Any = SimpleNamespace(top=SimpleNamespace(point=point), output=0)
-    question: Any = SimpleNamespace(model=model)
+    question: Any = SimpleNamespace(model=model, sweep=None)
     check(
         model_change.model_changes(question, response),
         modes_peak_change=0.1,
@@ -241,13 +241,15 @@ def test_rows_of_cases_follow_each_other_and_say_whose_they_are(monkeypatch: pyt
     monkeypatch.setattr(dataset, "with_levels", lambda *_: {})
     told = {"points": 2, "peak_point": 1, "attributes": "{}", "choice_sentence": "at 5 Hz", "points_failed": 1}
     one = told | {name: np.array([1.0, 2.0]) for name in COLUMNS if name.endswith("frequency_hz") and name not in ONCE}
-    one["stress_triangle"] = np.array([[0, 1, 2], [1, 2, 3]])  # rows without a frequency
+    rows = np.array([[0, 1, 2], [1, 2, 3]])  # of what has no frequency
+    one |= dict.fromkeys(("stress_triangle", "drawn_triangle", "drawn_load_point", "drawn_support"), rows)
     data = dataset.put_together([one, one | {"peak_point": -1}], ["first", "second"])
     owners = {owner: data[owner].values for owner in OWNERS.values()}
     each = [0, 0, 1, 1]
     check(owners, point_case=each, another_case=each, attempt_case=each, alert_case=each, bifurcation_case=each)
     check(owners, verify_case=each, stability_case=each, not_periodic_case=each, tuned_case=each)
-    check(owners, side_branch_case=each, side_point_case=each, stress_face_case=each)
+    check(owners, side_branch_case=each, side_point_case=each, stress_face_case=each, drawn_face_case=each)
+    check(owners, drawn_load_case=each, drawn_support_case=each)
     check({name: data[name].values for name in told if name in data}, peak_point=[1, -1], points=[2, 2])
     assert data["choice_sentence"].values.tolist() == ["at 5 Hz", "at 5 Hz"]
     assert data.attrs["failed"] == 2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, jumps
+from stickslip.response.forced.collected import LOSS_SEEN, jumps
 
 # evidence/models/two_blades.toml at ratio 4 with high = 5, as solved at commit 6ff2cce: Hz, amplitude of tip1.x in m, dissipation in J, and whether
 # a point keeps one harmonic; the contacts store 0.01455 J, and 0.00966 J is the largest dissipation, at 174.2 Hz

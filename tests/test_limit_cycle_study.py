@@ -12,10 +12,9 @@ from study_texts import JENKINS, answered, study_of
 
 import stickslip as ss
 from stickslip.analyses.columns import record_of
-from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE, _without
+from stickslip.analyses.limit_cycle.analysis import LIMIT_CYCLE, _without, compete
 from stickslip.analyses.limit_cycle.page import Cycles, cycle_table
 from stickslip.analyses.limit_cycle.records import LimitCycles
-from stickslip.analyses.limit_cycle.time import compete
 from stickslip.analyses.limit_cycle.verdicts import case_verdicts
 from stickslip.analyses.page import plots
 from stickslip.errors import InputError

@@ -95,7 +95,7 @@ def test_peaks_are_compared_with_few_harmonics(monkeypatch):
     """A peak with 31 harmonics: the change with more modes is the same with 15 of them, and with all."""
     changes = []
     for most in (15, 31):
-        monkeypatch.setattr("stickslip.analyses.forced_response.physics.model_change.MOST_HARMONICS", most)
+        monkeypatch.setattr("stickslip.response.peak_sensitivity.MOST_HARMONICS", most)
         sweep = {"low": 31, "high": 31, "selection": "always_high", "stability": "off", "points": 12}
         data = chain(2).forced_response(hz=(36.0, 46.0), **sweep)["forced_response"]
         changes.append(float(data["modes_peak_change"].values[0]))

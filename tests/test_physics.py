@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.analyses.forced_response.physics.limits import Physics
 from stickslip.assembly.assembling import assemble
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
@@ -17,6 +16,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.iwan import Iwan
 from stickslip.model.damping import Damping
 from stickslip.response.damping_of_modes import (
+    ModesInRange,
     Range,
     RangeMode,
     complex_stiffness,
@@ -148,7 +148,7 @@ def test_what_friction_can_do_to_one_mass_is_its_describing_function():
     # a mode ends where friction leaves it, whatever other modes do; without friction at its own frequency
     (mode,) = range_modes(found.system, found.load, Range(10 * HZ, 20 * HZ), springs)
     other = replace(best, stuck=2.0 * best.stuck, ends=7.0)
-    physics = Physics((mode,), (), friction, (other, best), True, np.zeros((1, 3)))
+    physics = ModesInRange((mode,), (), friction, (other, best), True, np.zeros((1, 3)))
     assert physics.ends(mode) == best.ends
     assert physics.ends(replace(mode, omega=3.0)) == 3.0
 

@@ -13,11 +13,11 @@ from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.analyses.forced_response.records.points import collect
 from stickslip.analyses.forced_response.stability.stable import examine
 from stickslip.analyses.forced_response.table import STEPS
 from stickslip.analyses.page import plots, report_html
 from stickslip.response.forced.by_shooting import shooting_response
+from stickslip.response.forced.collected import collect
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 

@@ -10,9 +10,9 @@ from test_similarity import by_differences
 
 import stickslip as ss
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
-from stickslip.analyses.forced_response.jacobians import reference_of
 from stickslip.analyses.page import plots, report_html
 from stickslip.harmonic.selection.similarity import natural_scales
+from stickslip.response.forced.compared_jacobians import reference_of
 from stickslip.response.forced.sweep import Sweep
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study

@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import ALONE, Question
-from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
 from stickslip.analyses.forced_response.stability import examination, examining, in_time, stable
 from stickslip.analyses.forced_response.stability.examining import (
     CARRIED,
@@ -50,6 +49,7 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure, numbered_dofs
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.forced.collected import Accepted, Response, collect
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.response.stability import HillStability, Stability, WaveDisturbance
 from stickslip.response.stability.found import Floquet

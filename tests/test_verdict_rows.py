@@ -12,7 +12,6 @@ from verdict_rows import INF, NAN, above, case_of, check
 from stickslip.analyses.all_motions import verdicts as motions
 from stickslip.analyses.all_motions.records import FoundMotions
 from stickslip.analyses.columns import record_of
-from stickslip.analyses.forced_response.verdicts.curve import jumps
 from stickslip.analyses.forced_response.verdicts.rules import coarse_steps
 from stickslip.analyses.limit_cycle import verdicts as cycles
 from stickslip.analyses.limit_cycle.records import LimitCycles
@@ -32,6 +31,7 @@ from stickslip.analyses.run_up import verdicts as running
 from stickslip.analyses.run_up.records import RunUp
 from stickslip.analyses.waves import verdicts as waves
 from stickslip.analyses.waves.verdicts import energy_doubts, unstable, unstable_wheel
+from stickslip.response.forced.collected import jumps
 from stickslip.response.nonlinear_modes.single_mode_validity import Isolation
 from stickslip.units import HZ, RPM
 

@@ -11,10 +11,10 @@ from small_v2 import changed, write_four_masses, write_shrouded_sector, write_tw
 
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import Question
-from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.stability import examining, in_time
 from stickslip.analyses.forced_response.stability.in_time import STEPS, Check, check_in_time, chosen, refined
 from stickslip.errors import InputError
+from stickslip.response.forced.collected import Response, collect
 from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult
 from stickslip.study.models.study import read_study

@@ -9,8 +9,8 @@ import numpy as np
 
 from evidence.benchmarks.trust import TRUTHS, Trial, said, trial, truth
 from evidence.strategies.cases import SelectionCase, chain, friction_ring, two_blades_strong, two_blades_stuck
-from stickslip.analyses.forced_response.records.points import collect
 from stickslip.response.forced.choices import RUNGS
+from stickslip.response.forced.collected import collect
 from stickslip.response.forced.response import forced_problem, forced_response
 
 SYSTEMS, SEED = 12, 7

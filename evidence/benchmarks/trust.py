@@ -18,9 +18,9 @@ import numpy as np
 from evidence.benchmarks.robustness import CPU_SECONDS, OutOfTimeError, at_most, missing
 from evidence.models.fresh_machines import FAMILIES, draw_fresh
 from evidence.models.random_machines import Drawn, draw
-from stickslip.analyses.forced_response.records.points import Accepted, collect
 from stickslip.errors import StickslipError
 from stickslip.harmonic.harmonic_set import harmonics_of
+from stickslip.response.forced.collected import Accepted, collect
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton

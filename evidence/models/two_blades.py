@@ -9,9 +9,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.analysis import FORCED_RESPONSE
 from stickslip.analyses.forced_response.problem import Question, question_of
-from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.arrays import IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced.collected import Response, collect
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep

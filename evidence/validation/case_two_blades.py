@@ -14,8 +14,8 @@ import numpy as np
 from evidence.models.two_blades import COARSER, two_blades
 from evidence.validation.compare import Record, record
 from stickslip.analyses.forced_response.problem import Question
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.stability.in_time import integrated, listed, refined
+from stickslip.response.forced.collected import Accepted, Response
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.study.verdict import Level
 from stickslip.units import HZ

@@ -358,8 +358,8 @@ def fit(
 def compile_() -> None:
     """Compile contact laws and time steps once after installing; without it the first run takes a minute or two more."""
     with _errors_as_text():
+        from stickslip.model.blas_threads import one_blas_thread
         from stickslip.response.precompile import compile_ahead
-        from stickslip.study.store.threads import one_blas_thread
 
         one_blas_thread()
         say("Compiling contact laws and time steps. What is compiled is kept if this is stopped.")

@@ -9,9 +9,9 @@ import plotly.graph_objects as go
 import xarray as xr
 
 from stickslip.analyses import pictures
-from stickslip.analyses.forced_response.page.tractions import with_bands
 from stickslip.analyses.inputs import inputs, study_of
 from stickslip.analyses.nonlinear_mode import page as nonlinear_mode
+from stickslip.analyses.residual_tractions.page import with_bands
 from stickslip.analyses.waves.page import waves
 from stickslip.analyses.waves.page.modes import with_resonance
 from stickslip.errors import input_error

@@ -10,12 +10,11 @@ from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.readers.units import Units
 from stickslip.study.exchange.chosen import Chosen, chosen
-from stickslip.study.exchange.contacts import contacts_of
 from stickslip.study.exchange.frd import write_frd
 from stickslip.study.exchange.motion import Motion, motion_of
 from stickslip.study.exchange.stress import SurfaceFields, stress_fields, write_stress_csv, write_stress_vtu
 from stickslip.study.exchange.uff import write_uff
-from stickslip.study.exchange.vtu import write_vtu
+from stickslip.study.exchange.vtu import contacts_of, write_vtu
 from stickslip.study.file.study import StudyFile, validated
 from stickslip.study.file.toml import parsed
 from stickslip.study.models.study import Study

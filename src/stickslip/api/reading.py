@@ -25,8 +25,8 @@ def read(path: Path, tell: Callable[[str], None] | None = None, *, allow_code: b
     InputError
         Naming every problem of the file, one a line.
     """
+    from stickslip.model.blas_threads import one_blas_thread
     from stickslip.study.file.toml import read_toml
-    from stickslip.study.store.threads import one_blas_thread
 
     one_blas_thread()
     read_toml(path)

@@ -1,4 +1,4 @@
-"""Number of OpenBLAS threads: one for small matrices, all for a large factorisation.
+"""Number of BLAS threads: one for small matrices, all for a large factorisation.
 
 The matrices of a response have a few hundred rows. Several threads wait for each other there: with two, a response point
 that needs 9 ms of work takes 220 ms of processor time. With one thread, sums have the same order in every run, so results
@@ -135,3 +135,14 @@ def by_one_thread(function: F) -> F:
             return function(*words, **named)
 
     return cast("F", whole)
+
+
+def one_blas_thread() -> None:
+    """Set BLAS to one thread before NumPy is loaded, unless the user has set a number.
+
+    The matrices of a run have a few hundred rows. Several threads wait for each other, and take ten times as long if other programs
+    use the cores.
+    """
+    if not any(name in os.environ for name in BLAS_THREADS):
+        for name in BLAS_THREADS[1:]:
+            os.environ[name] = "1"

@@ -12,9 +12,11 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
+from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import pressed_by
 from stickslip.response.self_excited.modes import StuckMode, sprung_modes
 from stickslip.response.system import System
 from stickslip.units import HZ
@@ -391,3 +393,92 @@ def _partners(alike: FloatArray) -> IntArray:
         order[row] = column
         alike[row, :] = alike[:, column] = -1.0
     return order
+
+
+@dataclass(frozen=True, eq=False)
+class ModesInRange:
+    """The excited modes in a range of frequencies, and what friction does to them, known without a response.
+
+    Attributes
+    ----------
+    stuck, sliding
+        Excited modes in the range, with stuck contacts, and with contacts sliding freely where they can.
+    friction
+        Friction forces of the contacts under the static loads.
+    damped
+        Effect of friction on each mode.
+    touching
+        Whether there are contacts.
+    springs
+        (n_contacts, 3) stiffnesses of the contacts that the static loads press, stuck, N/m.
+    """
+
+    stuck: tuple[RangeMode, ...]
+    sliding: tuple[RangeMode, ...]
+    friction: Friction
+    damped: tuple[DampedMode, ...]
+    touching: bool
+    springs: FloatArray
+
+    @property
+    def undamped(self) -> list[RangeMode]:
+        """Excited modes without damping while contacts stick."""
+        return [m for m in self.stuck if m.undamped]
+
+    @property
+    def unbounded(self) -> list[tuple[RangeMode, float]]:
+        """Undamped modes whose load exceeds the bound on friction, with the ratio of both."""
+        each = [(m, m.excess(self.friction)) for m in self.sliding if m.undamped]
+        return [(m, excess) for m, excess in each if 1.0 < excess < np.inf]
+
+    @property
+    def driven(self) -> RangeMode | None:
+        """The mode with the largest linear resonance with contacts stuck; None if the load excites none in the range."""
+        known = [m for m in self.stuck if m.force > 0.0]
+        return max(known, key=lambda m: m.resonance) if known else None
+
+    @property
+    def slip_ratio(self) -> float:
+        """Largest tangential force over its limit at the largest resonance with stuck contacts; NaN without friction or resonance."""
+        top = self.driven
+        if top is None or not self.friction.any:
+            return float("nan")
+        motion = np.abs(top.gaps[:, :2]) * top.resonance
+        force, limits = motion * self.springs[:, :2], self.friction.limits
+        return float(np.max(force[limits > 0.0] / limits[limits > 0.0]))
+
+    def ends(self, mode: RangeMode) -> float:
+        """Return the frequency of a mode with contacts sliding freely, rad/s; its own frequency if friction does not change it."""
+        near = [d for d in self.damped if abs(d.stuck - mode.omega) <= 1e-6 * mode.omega]
+        return near[0].ends if near else mode.omega
+
+
+def modes_in_range(
+    system: System, load: HarmonicLoad, within: Range, static_gap: FloatArray, static_force: FloatArray
+) -> ModesInRange | None:
+    """Return the excited modes in a range; None without a reduction, or if aerodynamic coefficients end inside the range.
+
+    Parameters
+    ----------
+    system
+        System; along an engine-order line it is taken at the middle of the range.
+    load
+        Periodic load.
+    within
+        Frequencies of the excitation.
+    static_gap, static_force
+        (n_contacts, 3) static gaps, m, and forces, N, of the contacts.
+    """
+    if not system.structure.reduced:
+        return None
+    friction = friction_of(system.springs, static_gap, static_force)
+    holds = pressed_by(system.springs.laws, static_force)
+    stuck, sliding = springs_of(system, holds), springs_of(system, holds, friction.slips)
+    try:
+        modes = [tuple(range_modes(system, load, within, own)) for own in (stuck, sliding)]
+        harmonics = sorted(h for h, force in load.harmonics.items() if h and np.any(force))
+        damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
+    except InputError:  # the range exceeds the table of aerodynamic coefficients
+        return None
+    touching = bool(system.interface.n_contacts)
+    return ModesInRange(modes[0], modes[1], friction, tuple(damped), touching, np.reshape(stuck, (-1, 3)))

@@ -1,4 +1,4 @@
-"""Sensitivity of a resonance peak to the contact model: to the contact stiffness, and to the number of contact points.
+"""Sensitivity of a resonance peak to the model: to the contact stiffness, the number of contact points, and other changes.
 
 A solution of ``R(x, ω, κ) = 0``, with the logarithm κ of a factor on all contact stiffnesses, changes by ``dx/dκ = -J⁻¹
 ∂R/∂κ``. Only the contact forces depend on κ; their derivative is a finite difference at the same motion. At a peak
@@ -7,7 +7,8 @@ frequency. Solved points lie near the peak, not on it. Two of them with slightly
 derivatives of ``∂A/∂ω`` and ``∂A/∂κ`` by the frequency, and from these the peak frequency, its derivative ``dω/dκ =
 -A_κω / A_ωω`` and ``∂A/∂κ`` at the peak.
 
-With half as many contact points, each point represents two neighbours and their mean gap.
+With half as many contact points, each point represents two neighbours and their mean gap. Other changes of the model are found by solving
+its peak again, from the peak of the first one.
 """
 
 from collections.abc import Sequence
@@ -21,9 +22,14 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.forced.resonance import peak_from
+from stickslip.response.forced.response import accepted_points, forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
+from stickslip.units import HZ
 
 STIFFNESSES = ("k_t", "k_w", "k_n", "cubic_t", "cubic_w", "cubic_n")  # fields of laws, N/m and N/m³
 STEP = 1e-5  # relative step of the stiffness, and of the motion for the amplitude, in central differences
@@ -31,6 +37,12 @@ FOLLOWS_RTOL = 1e-9  # rounding of a stuck stiffness; the steps of the stiffness
 APART = 1e-4  # relative distance of the two frequencies
 TINY = float(np.finfo(float).tiny)
 PEAK_DISTANCE_RTOL = 0.005  # largest relative distance of a peak from its solved point
+BESIDE = 0.03  # half-width of a short sweep about a peak, relative to its frequency
+SWEPT_POINTS = 12  # points of this sweep
+PEAK_POINTS = 4  # points added to resolve its peak
+MOST_HARMONICS = 15  # of peaks that are compared, both alike; more change the comparison less than its last digit told
+AT_AN_END = 1e-9  # relative distance from an end of the sweep, below which a peak is no resonance
+UNKNOWN_CHANGE = (float("nan"), float("nan"))
 FEWEST_HALVED = 8  # smallest number of points of a contact that is halved: fewer would support it differently
 
 
@@ -253,3 +265,72 @@ def _pairs(position: FloatArray) -> IntArray:
         takes[near] = i
         open_to[[i, near]] = False
     return takes
+
+
+Found = tuple[ForcedProblem, ForcedPoint] | None  # a peak, with the problem that it solves
+
+
+def with_few_harmonics(load: HarmonicLoad, point: ForcedPoint) -> ForcedPoint:
+    """Return a point without the harmonics that a comparison of two peaks does not need."""
+    rows = point.harmonics <= max(MOST_HARMONICS, 3 * max(load.harmonics))
+    if np.all(rows):
+        return point
+    kept = point.kept[rows] if point.kept.size else point.kept
+    harmonics = point.harmonics[rows]
+    return replace(point, coefficients=point.coefficients[: harmonics[-1] + 1], harmonics=harmonics, kept=kept)
+
+
+def at_resonance(sweep: Sweep, point: ForcedPoint) -> bool:
+    """Whether a sweep resolved a peak at a point: frequencies are not listed, and it is no end of the sweep."""
+    ends = np.array(sweep.omega_range)
+    return not (np.any(np.abs(ends / point.omega - 1.0) < AT_AN_END) or sweep.grid.size)
+
+
+def comparing_sweep(sweep: Sweep, point: ForcedPoint) -> Sweep:
+    """Return the sweep that finds a peak from a point, with its harmonics and few points."""
+    own, few = point.support, min(sweep.peak_points, PEAK_POINTS)
+    return replace(sweep, low=own, high=own, selection="always_high", peak_points=few)
+
+
+def peak_near(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> Found:
+    """Find the peak of a system near a point of another one; at listed frequencies and ends of the sweep, the motion there.
+
+    Parameters
+    ----------
+    system, load
+        The changed model.
+    sweep
+        Sweep that found the point.
+    point
+        A peak of the other system.
+    """
+    own = comparing_sweep(sweep, point)
+    problem = forced_problem(system, load, own)
+    if at_resonance(sweep, point):
+        peak = peak_from(problem, point) or _swept_peak(system, load, own, point)
+        return None if peak is None else (problem, peak)
+    balance = problem.balance(point.support)
+    start = balance.unknowns(point.coefficients)
+    found = newton(lambda x: balance.linearise(x, point.omega), start, own.newton)
+    if not found.status.converged:
+        return None
+    return problem, replace(point, coefficients=balance.coefficients(found.x))
+
+
+def _swept_peak(system: System, load: HarmonicLoad, sweep: Sweep, point: ForcedPoint) -> ForcedPoint | None:
+    """Find a peak by a short sweep, where no solver finds it from a point; None at an end of the sweep."""
+    around = (point.omega * (1.0 - BESIDE), point.omega * (1.0 + BESIDE))
+    short = replace(sweep, omega_range=around, points=SWEPT_POINTS, rescue="off")
+    problem = forced_problem(system, load, short)
+    found = [p for p in accepted_points(list(forced_response(system, load, short))) if p.converged]
+    top = max(found, key=problem.amplitude, default=None)
+    inside = top is not None and min(p.omega for p in found) < top.omega < max(p.omega for p in found)
+    return top if inside else None
+
+
+def peak_change(own: Found, other: Found, output: int) -> tuple[float, float]:
+    """Return the relative change of a peak's amplitude, and the change of its frequency in Hz; NaN if either was not found."""
+    if own is None or other is None:
+        return UNKNOWN_CHANGE
+    before, after = (problem.amplitude(point, output) for problem, point in (own, other))
+    return after / before - 1.0, (other[1].omega - own[1].omega) / HZ

@@ -8,6 +8,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.harmonic_set import to_complex, to_real
+from stickslip.model.structure import ROTATIONS
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 
@@ -119,3 +120,33 @@ def _period(problem: ForcedProblem, point: ForcedPoint) -> ContactPeriod:
         return own.contacts(own.unknowns(point.coefficients), point.omega)
     gaps = point.coefficients @ own.interface.gap_operator.T
     return contact_forces(to_real(gaps), own.compiled, problem.sweep.samples, point.omega)
+
+
+def rotation_and_strain(
+    problem: ForcedProblem, point: ForcedPoint, away: FloatArray, stiff_volume: float
+) -> tuple[float, float]:
+    """Return the largest rotation (rad) and the root mean square of the strain of a motion; NaN where one is not known.
+
+    Rotations are those of rotational dofs, and the mean slope from the clamp to an output.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    point
+        A converged point of it.
+    away
+        (k,) distances of the first k outputs from the clamp, m; NaN where unknown.
+    stiff_volume
+        Volume times modulus of the elastic parts, J; NaN if unknown.
+    """
+    system, linear = problem.system, problem.low.linear
+    moved = np.abs(linear.recover(point.omega, point.coefficients))[1:].sum(axis=0)
+    turns = np.isin(np.array(system.structure.dofs.component), ROTATIONS)
+    known = np.concatenate([moved[turns], moved[system.outputs[: away.size]] / away])
+    known = known[np.isfinite(known)]
+    strain = np.nan
+    if np.isfinite(stiff_volume):
+        energy = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
+        strain = float(np.sqrt(max(4.0 * energy, 0.0) / stiff_volume))
+    return (float(known.max()) if known.size else np.nan), strain

@@ -19,7 +19,6 @@ from stickslip.analyses.forced_response.physics.known import (
 from stickslip.analyses.forced_response.physics.limits import (
     ESTIMATE,
     NAMED_MODES,
-    Physics,
     beforehand,
     damper_lines,
     driven_line,
@@ -42,6 +41,7 @@ from stickslip.model.facts import facts_of_part
 from stickslip.model.modes import normal_modes
 from stickslip.model.slow_steps import step
 from stickslip.reduction.waves import excited_wave
+from stickslip.response.damping_of_modes import ModesInRange
 from stickslip.study.analysis import Advice, Case
 from stickslip.study.verdict import Verdict
 from stickslip.units import HZ, millimetres
@@ -252,7 +252,7 @@ def _frequencies_far_off(question: Question) -> Iterator[str]:
     )
 
 
-def _of_friction(physics: Physics | None) -> Iterator[str]:
+def _of_friction(physics: ModesInRange | None) -> Iterator[str]:
     """Yield the estimate of the damping by friction, mode by mode."""
     damped = [] if physics is None else physics.damped[:NAMED_MODES]
     for mode in damped:
@@ -261,7 +261,7 @@ def _of_friction(physics: Physics | None) -> Iterator[str]:
         yield ESTIMATE
 
 
-def _left_out(question: Question, physics: Physics | None) -> Iterator[str]:
+def _left_out(question: Question, physics: ModesInRange | None) -> Iterator[str]:
     """Yield the range that the sweep leaves out between the sticking and the sliding mode that the load drives most."""
     top = None if physics is None else physics.driven
     if physics is None or top is None:

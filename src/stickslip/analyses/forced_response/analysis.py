@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.advice import advice, of_pressures
-from stickslip.analyses.forced_response.jacobians import of_jacobians
-from stickslip.analyses.forced_response.more_harmonics import check_harmonics
+from stickslip.analyses.forced_response.more_harmonics import check_harmonics, of_doubt, of_jacobians
 from stickslip.analyses.forced_response.physics.known import known
 from stickslip.analyses.forced_response.physics.limits import PHYSICS, motion_at_peak, of_physics
 from stickslip.analyses.forced_response.physics.model_change import model_changes, peak_shift, stiffness_changes
@@ -27,11 +26,9 @@ from stickslip.analyses.forced_response.problem import (
 from stickslip.analyses.forced_response.records.blades import of_blades
 from stickslip.analyses.forced_response.records.columns import KINDS, KnownVerdicts, OperatingRange, stored
 from stickslip.analyses.forced_response.records.dataset import put_together, with_measured
-from stickslip.analyses.forced_response.records.points import Response, lost_point
 from stickslip.analyses.forced_response.records.values import (
     Values,
     of_checks,
-    of_doubt,
     of_examined,
     of_model,
     of_response,
@@ -67,6 +64,7 @@ from stickslip.harmonic.selection.strategy import always_kept, judged
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.by_shooting import shooting_response
 from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.collected import Response, lost_point
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.arrays import BoolArray
 from stickslip.assembly.sides.mistuned import listed
 from stickslip.harmonic.harmonic_set import Harmonics, named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.choices import RUNGS
+from stickslip.response.forced.collected import Response
 from stickslip.response.forced.response import ForcedPoint, Sweep
 from stickslip.units import HZ
 

@@ -1,18 +1,29 @@
-"""``--verify-harmonics``: the predicted change of each accepted solution by twice the harmonics of the study."""
+"""More harmonics than the study keeps: what they would change at each accepted solution, and in its Jacobian.
 
+``--verify-harmonics`` predicts the change by twice the harmonics. ``[harmonics] similarity = true`` compares Jacobians with few and with many:
+ΔJ and Γ along the response, and the blocks between harmonics at the peak (Gastaldi & Berruti 2017, section 6.2 and figure 1).
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.analyses.forced_response.chooser import error_text
 from stickslip.analyses.forced_response.problem import MORE_THAN_LOW, Question
-from stickslip.analyses.forced_response.records.points import Response
+from stickslip.analyses.forced_response.records.columns import Jacobians, MoreHarmonics, stored
+from stickslip.analyses.forced_response.records.values import Values
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import Harmonics, named
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.forced.collected import Response
+from stickslip.response.forced.compared_jacobians import NO_SIMILARITY, block_norms, compared_at, reference_of
+from stickslip.response.forced.problem import with_stiffness
 from stickslip.response.verification import check_support
 from stickslip.study.file.harmonics import HIGHEST
+from stickslip.study.store.progress import LOG
 from stickslip.units import HZ
 
 
@@ -122,4 +133,56 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
     place = problem.measure.dofs.tolist().index(worst.dof)
     return replace(
         doubt, frequency_hz=float(worst.omega / HZ), kept=named(worst.kept), label=question.model.error_labels[place]
+    )
+
+
+def of_doubt(doubt: ReferenceDoubt) -> Values:
+    """Return the variables of the check with more harmonics."""
+    return stored(
+        MoreHarmonics(
+            reference_error_percent=100 * doubt.errors,
+            reference_worst_percent=100 * doubt.worst,
+            reference_worst_hz=doubt.frequency_hz,
+            reference_above=doubt.above,
+            reference_sentence=doubt.sentence,
+        )
+    )
+
+
+@by_one_thread
+def of_jacobians(question: Question, response: Response) -> Values:
+    """Return ΔJ and Γ of every accepted point, and the block norms at the peak and where ΔJ is largest."""
+    problem, sweep = question.problem, question.problem.sweep
+    solved = max((a.point.order for a in response.accepted if a.point.converged), default=0)
+    reference = reference_of(sweep, problem.system.retained.size, solved)
+    large = with_stiffness(problem.balance(reference))
+    found = [compared_at(problem, large, accepted) for accepted in response.accepted]
+    each = [NO_SIMILARITY if one is None else one.similarity for one in found]
+    change = np.array([one.change for one in each])
+    worst = int(np.nanargmax(change)) if np.any(np.isfinite(change)) else -1
+    peak, missing = (found[at] if at >= 0 else None for at in (response.peak, worst))
+    record = Jacobians(
+        jacobian_reference=reference[-1],
+        jacobian_rows=large.size,
+        jacobian_change_percent=100 * change,
+        gamma_mean_diagonal=np.array([one.mean_diagonal for one in each]),
+        gamma_zero_percent=100 * np.array([one.zero_share for one in each]),
+        jacobian_block_norm=block_norms(large, peak),
+        neglected_block_norm=block_norms(large, missing, sweep.low_harmonics),
+        neglected_frequency_hz=float("nan") if missing is None else missing.omega / HZ,
+    )
+    for line in _lines(record, sweep.low_harmonics, reference):
+        LOG.info(f"similarity: {question.said(line)}")
+    return stored(record)
+
+
+def _lines(record: Jacobians, low: Harmonics, reference: Harmonics) -> Iterator[str]:
+    if not np.isfinite(record.jacobian_change_percent).any():
+        yield "no point has solutions with few and with many harmonics"
+        return
+    gamma = record.gamma_mean_diagonal
+    yield (
+        f"from H = {named(low)} to H = {named(reference)} the Jacobian changes by up to "
+        f"{np.nanmax(record.jacobian_change_percent):.3g} %, at {record.neglected_frequency_hz:.2f} Hz; "
+        f"the mean of the diagonal of Γ is {np.nanmin(gamma):.4g} to {np.nanmax(gamma):.4g}"
     )

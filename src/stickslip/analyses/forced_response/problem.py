@@ -32,6 +32,7 @@ from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.model.strength import StrengthCard
 from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.choices import RUNGS, RelativeTo
+from stickslip.response.forced.compared_jacobians import MAX_COMPARED_ROWS
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.response.self_excited.modes import natural_frequencies
 from stickslip.response.system import System
@@ -138,7 +139,6 @@ STABLE = "stability"  # check of every run, unless the study turns it off
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 TOO_MANY = "are more than"  # part of the sentence on a motion that was not integrated
 ALONE = "of what contacts, loads and outputs keep alone"  # part of the same sentence, if fewer modes do not help
-MAX_COMPARED_ROWS = 2000  # rows of dense Jacobians: some seconds a point
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 MORE_THAN_LOW = 'Give harmonics.selection = "guarded_alert" or "always_high", or a larger harmonics.low'
 

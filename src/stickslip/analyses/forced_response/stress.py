@@ -12,7 +12,6 @@ import scipy
 
 from stickslip.analyses.forced_response.problem import Question, StressAsked, card_of
 from stickslip.analyses.forced_response.records.columns import STRESS_AT, SurfaceStress, stored
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.verdicts.margin import ONE_SIDED
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
@@ -33,6 +32,7 @@ from stickslip.model.strength import (
 )
 from stickslip.model.strength.cycle import CRITERIA, worst_utilisation
 from stickslip.model.strength.haigh import NO_YIELD
+from stickslip.response.forced.collected import Response
 from stickslip.response.forced.response import ForcedPoint
 from stickslip.study.exchange.chosen import FORCED, Chosen
 from stickslip.study.exchange.motion import expanded

@@ -16,10 +16,6 @@ from stickslip.analyses.modal_synthesis.verdicts import case_verdicts, percent, 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import SingularError, StickslipError
-from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.forced.accepted import accepted_points
-from stickslip.response.forced.problem import forced_problem
-from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, nonlinear_mode
 from stickslip.response.nonlinear_modes.more_points import refined
@@ -34,10 +30,12 @@ from stickslip.response.nonlinear_modes.single_mode_validity import (
     peak_with_others,
 )
 from stickslip.response.nonlinear_modes.synthesis import (
-    Resonance,
     Synthesised,
+    change_of_peak,
+    direct_response,
     free_motions,
     is_homogeneous,
+    level_to_solve,
     peak_curve,
     resonances,
     synthesise,
@@ -58,8 +56,6 @@ HARMONICS = 0.2  # higher harmonics over the first, above which the first alone 
 AROUND = 12.0  # half-widths of the widest peak that are shown on either side
 NARROWEST, WIDEST = 0.02, 0.2  # limits of this range, relative to the frequency
 MOMENTS = 600  # stored instants of a passage
-# share of the level for the first motion of a mode that begins linear; below, responses are proportional to their level
-FAINT = 1e-3
 NOTHING = np.zeros(0)
 NOBODY = Isolation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, linear=False)
 
@@ -141,14 +137,14 @@ def judged(alone: Isolation, resolved: float, changed: float) -> tuple[str, str]
 def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     began = process_time()
     own, question = shared.oscillator, shared.question
-    known = _in_proportion(own, level)
+    known = level_to_solve(own, level)
     share = level / known
     curve = synthesise(own, known)
     tops = curve.peaks
     # every curve has one peak; a sweep meets the first curve
     peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]
     alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
-    resolved = _resolved(shared, tops[0]) if peaks else np.nan
+    resolved = change_of_peak(shared.coarser, tops[0]) if peaks else np.nan
     changed = own.by_harmonics(tops[0].place) if peaks else np.nan
     detached = max(peaks[1:], default=(np.nan, np.nan))
     answer, why = _answer(shared, curve, alone, (resolved, changed))
@@ -164,7 +160,11 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     spent = process_time() - began
     passages = _passages(shared, known, shown=shown)
     began = process_time()
-    direct = _direct(shared, level) if question.asked.direct else (NOTHING, NOTHING)
+    direct: tuple[FloatArray, FloatArray] = NOTHING, NOTHING
+    if question.asked.direct:
+        how, most = question.discretisation, max(question.asked.most_harmonics, 1)
+        sweep = Sweep(omega_range=shared.ends, cap=most, samples=how.samples, evaluator=how.evaluator)
+        direct = direct_response(question.model.system, question.model.load, level, sweep, question.dof)
     top = int(np.nanargmax(direct[1])) if np.any(np.isfinite(direct[1])) else -1
     return SynthesisLevel(
         level=level,
@@ -203,14 +203,6 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     )
 
 
-def _in_proportion(own: ModalOscillator, level: float) -> float:
-    """Return the level to solve: for a very small one a larger one without slip, to which the response is proportional."""
-    faint = FAINT * float(own.needed(np.array([own.begins]))[0])
-    if own.begins == 0.0 or level >= faint or len(resonances(own, faint)) > 1:
-        return level
-    return faint
-
-
 def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tuple[float, float]) -> tuple[str, str]:
     """Return the verdict on a level and its reason; the peak on the curve from small amplitudes counts."""
     if not curve.place.size:
@@ -226,12 +218,6 @@ def _answer(shared: Synthesis, curve: Synthesised, alone: Isolation, errors: tup
     return answer, why
 
 
-def _resolved(shared: Synthesis, found: Resonance) -> float:
-    """Return the relative change of a peak if every second point of the backbone is left out."""
-    other = [r.amplitude for r in resonances(shared.coarser, found.level) if r.top]
-    return min((abs(a / found.amplitude - 1.0) for a in other), default=np.inf)
-
-
 def _ends(question: Question, own: ModalOscillator) -> tuple[float, float]:
     """Return the range of frequencies in the figure, rad/s."""
     given = question.asked.frequency_hz
@@ -242,24 +228,6 @@ def _ends(question: Question, own: ModalOscillator) -> tuple[float, float]:
     here = own.at(np.array([own.ends[0], *(r.place for r in tops)]))
     widest = float(np.clip(AROUND * np.max(np.abs(here.ratio)), NARROWEST, WIDEST))
     return float(omega.min() * (1.0 - widest)), float(omega.max() * (1.0 + widest))
-
-
-def _direct(shared: Synthesis, level: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies, rad/s, and amplitudes of the output, m, of a forced response by harmonic balance."""
-    question = shared.question
-    known = question.model.load
-    load = HarmonicLoad(known.static, {h: level * f for h, f in known.harmonics.items()})
-    how = question.discretisation
-    sweep = Sweep(
-        omega_range=shared.ends, cap=max(question.asked.most_harmonics, 1), samples=how.samples, evaluator=how.evaluator
-    )
-    problem = forced_problem(question.model.system, load, sweep)
-    points = accepted_points(list(forced_response(question.model.system, load, sweep)))
-    linear = problem.high.linear
-    amplitude = [
-        abs(linear.recover(p.omega, p.coefficients)[1, question.dof]) if p.converged else np.nan for p in points
-    ]
-    return np.array([p.omega for p in points]), np.array(amplitude)
 
 
 def _passages(shared: Synthesis, level: float, *, shown: bool) -> tuple[Any, Any, Any, Any]:

@@ -12,19 +12,18 @@ from stickslip.analyses.quasi_periodic.problem import NAME, Question, hertz, que
 from stickslip.analyses.quasi_periodic.records import NOT_FOUND, QuasiPeriodic, TwoFrequencies, answer
 from stickslip.analyses.quasi_periodic.table import QuasiPeriodicTable
 from stickslip.analyses.quasi_periodic.verdicts import case_verdicts, tables
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import StickslipError
 from stickslip.harmonic.two_frequency import Indices, TorusPath
 from stickslip.response.quasi_periodic.in_time import second_tone_in_time, two_loads_in_time
-from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, with_enough
+from stickslip.response.quasi_periodic.problem import Solving, TorusMotion, TwoTones, envelope, farthest, with_enough
 from stickslip.response.quasi_periodic.tone import growing_tones, solve_free, swept, tone_beside
 from stickslip.study.analysis import Analysis, Case, Notes, of_tables
 from stickslip.study.store.progress import LOG, advance
 from stickslip.units import HZ, millimetres_between
 
 PHASES = 96
-GRID = 64  # phases of each frequency, over which the largest distance from the mean is taken
 FAILED = (StickslipError, FloatingPointError, np.linalg.LinAlgError)
 
 
@@ -75,7 +74,7 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
         largest=shown.largest,
         least=shown.least,
         rms=shown.rms,
-        extreme=_extreme(motion, outputs),
+        extreme=farthest(motion, outputs),
         envelope=shown.amplitude[:, 0],
         indices=np.array(motion.indices, dtype=np.int64),
         amplitude=np.hypot(seen.real, seen.imag),
@@ -197,13 +196,6 @@ def _begun(problem: TwoTones, before: TwoFrequencies) -> tuple[TwoTones, FloatAr
     indices: Indices = tuple((int(j), int(k)) for j, k in before.indices)
     own = problem.with_indices(indices)
     return own, own.balance.unknowns(before.unknowns[..., 0] + 1j * before.unknowns[..., 1])
-
-
-def _extreme(motion: TorusMotion, outputs: IntArray) -> FloatArray:
-    phases = 2.0 * np.pi * np.arange(GRID) / GRID
-    first, second = np.meshgrid(phases, phases)
-    values = motion.values(outputs, first, second)
-    return np.asarray(np.abs(values - motion.coefficients[0, outputs].real).max(axis=(0, 1)))
 
 
 def _parts(rows: ComplexArray) -> FloatArray:

@@ -11,10 +11,9 @@ from stickslip.analyses.resonance.records import Resonances, answer
 from stickslip.analyses.resonance.table import ResonanceTable
 from stickslip.analyses.resonance.verdicts import case_verdicts, tables
 from stickslip.analyses.vibrating import represented
-from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
-from stickslip.response.resonances.first import PeakSearch, met_by_a_sweep
+from stickslip.response.resonances.first import unmet_peaks
 from stickslip.response.resonances.point import PeakPoint, heights, valley
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, peak_curve, represented_as, smallest_peak
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
@@ -22,47 +21,8 @@ from stickslip.study.store.progress import LOG, advance
 from stickslip.study.verdict import Verdict, doubt, to_json
 from stickslip.units import HZ, millimetres
 
-SWEEPS = 8  # largest number of sweeps, at values spread over the range of peaks followed back
 UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
 HARMONICS = "harmonics"  # note: the highest peak with more harmonics
-
-
-def unmet_peaks(
-    search: PeakSearch, points: Sequence[PeakPoint], values: Sequence[float], later: int
-) -> dict[str, FloatArray]:
-    """Return number and value of the peaks that no sweep has confirmed.
-
-    Parameters
-    ----------
-    search
-        Search of the peaks.
-    points
-        All points found.
-    values
-        Values in the order of visits; the peaks of the last one were found by a sweep.
-    later
-        Number of the first peak that was followed back.
-    """
-    back = [p for p in points if p.peak >= later and p.converged and p.is_maximum]
-    places = [i for i, v in enumerate(values[:-1]) if any(p.value == v for p in back)]
-    share = np.linspace(0, len(places) - 1, min(SWEEPS, len(places)))
-    swept = sorted({places[int(i)] for i in share})
-    met: dict[tuple[int, int], bool] = {}
-    for i in swept:
-        here = [p for p in back if p.value == values[i]]
-        met |= {(p.peak, i): own for p, own in zip(here, met_by_a_sweep(search, here), strict=True)}
-
-    def reached(peak: int, i: int) -> bool:
-        # a peak that sweeps meet on both sides of a value would be met there as well
-        before = max((j for j in swept if j <= i), default=-1)
-        after = min((j for j in swept if j >= i), default=len(values) - 1)
-        return met.get((peak, before), False) and met.get((peak, after), False)
-
-    unmet = [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]
-    return {
-        "peak": np.array([peak for peak, _ in unmet], dtype=float),
-        "value": np.array([v for _, v in unmet], dtype=float),
-    }
 
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
@@ -104,7 +64,9 @@ def _solve(inputs: Question, done: Sequence[PeakPoint], notes: Notes) -> Iterato
         except InputError as error:
             problem = error.problem
         between = valley(every, heights(every, asked.values), asked.values)
-        notes.put(UNMET, unmet_peaks(inputs.search, every, asked.values, later))
+        unmet = unmet_peaks(inputs.search, every, asked.values, later)
+        peaks, values = (np.array([own[k] for own in unmet], dtype=float) for k in (0, 1))
+        notes.put(UNMET, {"peak": peaks, "value": values})
         notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
     notes.put(HARMONICS, _more_harmonics(inputs, every))
     notes.put(LAST, {"problem": problem})

@@ -14,12 +14,12 @@ from stickslip.analyses.run_up.problem import Along, Question, RunUpPoint, of_or
 from stickslip.analyses.run_up.records import FOUND, FastRunUp, Line, RunUp, answer, fast_run_up, steady_run_up
 from stickslip.analyses.run_up.table import RunUpTable
 from stickslip.analyses.run_up.verdicts import case_verdicts, tables
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray
 from stickslip.assembly.model import Model
 from stickslip.assembly.sides.unreduced import refuse_whole
 from stickslip.errors import SingularError
 from stickslip.response.forced.response import forced_response
-from stickslip.response.rotating.envelope import EnvelopePoint, SweepInTime, envelope
+from stickslip.response.rotating.envelope import EnvelopePoint, SweepInTime, envelope, neglected
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, of_tables
 from stickslip.study.store.archive import flat, from_flat
 from stickslip.study.store.progress import LOG, advance
@@ -27,7 +27,6 @@ from stickslip.units import HZ, RPM
 
 MAX_FAST_HARMONIC = 7  # highest harmonic of a fast run-up, unless loads drive higher ones
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
-JUDGED_PEAK_SHARE = 0.5  # share of the peak, above which the second derivative is compared with the first
 
 
 def solve(inputs: Question, done: Sequence[RunUpPoint], notes: Notes) -> Iterator[RunUpPoint]:
@@ -124,30 +123,6 @@ def _kept(
     """Yield frequency, driven harmonics (d,) of the first output, and whether a step was solved; drop all else of a step."""
     for point in points:
         yield point.omega, point.coefficients[driven][:, outputs[0]], point.converged
-
-
-def neglected(time: FloatArray, amplitude: ComplexArray, omega: FloatArray) -> float:
-    """Return the ratio of the second derivative of an amplitude to 2ω times the first, around the largest amplitude.
-
-    Parameters
-    ----------
-    time, omega
-        (n,) time, and frequency of the harmonic, s and rad/s.
-    amplitude
-        (n,) complex.
-    """
-    if time.size < 3:
-        return float("nan")
-    before, after = np.diff(time)[:-1], np.diff(time)[1:]
-    slopes = np.diff(amplitude) / np.diff(time)
-    first = (before * slopes[1:] + after * slopes[:-1]) / (before + after)
-    second = 2 * (slopes[1:] - slopes[:-1]) / (before + after)
-    size = np.abs(amplitude[1:-1])
-    near = size > JUDGED_PEAK_SHARE * size.max()
-    weight = (before + after)[near]  # many short steps must not count more
-    there = np.sum(weight * np.abs(second[near]) ** 2)
-    here = np.sum(weight * np.abs(2 * omega[1:-1][near] * first[near]) ** 2)
-    return float(np.sqrt(there / here)) if here > 0.0 else float("nan")
 
 
 def _dataset(solved: Sequence[Solved]) -> xr.Dataset:

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, cast
 
-import numpy as np
-
 from stickslip.analyses.facts import facts_of
 from stickslip.analyses.forced_response.estimate import check_limits, estimate, within_limits
 from stickslip.analyses.forced_response.problem import measured, peak_first, sweep_through
@@ -17,13 +15,10 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.sides.engine_order_sweep import over_speed, with_engine_order
 from stickslip.errors import input_error
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
-from stickslip.model.modes import gyroscopic_modes, natural_frequencies, with_springs
-from stickslip.model.structure import Structure
-from stickslip.reduction.basis import in_coordinates
-from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, Sweep, forced_problem
+from stickslip.response.rotating.campbell import frequencies_along
 from stickslip.study.analysis import Case
 from stickslip.study.verdict import said
 
@@ -98,27 +93,7 @@ class Along:
 
     def frequencies(self, speeds: FloatArray, n_modes: int, stuck: bool) -> FloatArray:
         """Return (s, n_modes) natural frequencies, Hz, with contacts open or all stuck; NaN for missing modes."""
-        system = self.model.system
-        found = np.full((len(speeds), n_modes), np.nan)
-        for i, speed in enumerate(speeds):
-            structure = self.line.at(float(speed)).of_harmonic(1)
-            if stuck:
-                springs = system.springs.stuck_stiffness()
-                structure = with_springs(structure, system.interface.gap_operator, springs)
-            structure = _unconstrained(structure, self.line)
-            count = min(n_modes, structure.n)
-            if self.coriolis:
-                hertz = gyroscopic_modes(structure, count).frequencies_hz
-            else:
-                hertz = natural_frequencies(structure, count)
-            found[i, : len(hertz)] = hertz
-        return found
-
-
-def _unconstrained(structure: Structure, line: SpeedLine) -> Structure:
-    """Return a structure on the motions that its constraints allow."""
-    way = own_motions(structure, line.multipliers)
-    return in_coordinates(structure, way, structure.dofs.take(np.arange(way.shape[1])), {})
+        return frequencies_along(self.model.system, speeds, n_modes, stuck=stuck, coriolis=self.coriolis)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
 from stickslip.analyses.operation import InOperation, asked_of, ends_of
 from stickslip.analyses.run_up.problem import DRAWN, Along, Question, RunUpPoint
 from stickslip.arrays import FloatArray
 from stickslip.column import column, rows
+from stickslip.response.forced.collected import Accepted, Response, collect
 from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.recovery import signals
 from stickslip.study.analysis import Solved

@@ -26,7 +26,7 @@ from stickslip.model.modes import gyroscopic_modes, normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.wave_family import WaveFamily
-from stickslip.response.rotating.campbell import campbell
+from stickslip.response.rotating.campbell import campbell, stiffening_of
 from stickslip.response.rotating.flutter import FlutterOfWave, damping_ratio, flutter_of_wave
 from stickslip.study.analysis import Notes
 from stickslip.study.store.progress import advance
@@ -265,34 +265,15 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     if asked.shapes:
         moved = asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex))
         moved = unit_shapes(moved, _own_points(asked.model))
-    growth = _growth(asked, structure, hertz, vectors)
+    growth: FloatArray = np.zeros(asked.n_modes)
+    if asked.speeds[0] and asked.model.rotates:
+        growth = stiffening_of(structure, hertz, vectors, asked.stiffening, asked.speeds[0], turning=asked.turning)
     flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
     seconds = perf_counter() - began
     found = WaveModes(wave_number=wave_number, seconds=seconds, frequencies_hz=hertz, growth=growth, shapes=moved)
     if flow is None:
         return found
     return replace(found, damping=damping_ratio(flow.damped), damped_hz=flow.damped.imag / HZ)
-
-
-def _growth(asked: Question, structure: Structure, hertz: FloatArray, vectors: Matrix) -> FloatArray:
-    """Return the (m,) derivatives of ω² by Ω², from ``φᴴ (K + iωD − ω²M) φ = 0``; changes of φ are of second order."""
-    x = asked.speeds[0] ** 2
-    if x == 0 or not asked.model.rotates:
-        return np.zeros(len(hertz))
-    # cyclic faces, joins and springs do not change with the speed, only the parts do
-    by_x = _form(asked.stiffening, structure.expand(vectors))
-    mass, omega = _form(structure.mass, vectors), 2 * np.pi * hertz
-    if not asked.turning:
-        return np.asarray((by_x / mass).real)
-    # Coriolis terms grow with Ω; the real part of the damping dissipates, and does not count here
-    turning = -_form(structure.damping, vectors).imag
-    by_omega = 2 * omega * mass - turning
-    return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
-
-
-def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
-    """Return ``φᴴ A φ`` of each column."""
-    return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
 
 
 def _own_points(model: Model) -> IntArray:

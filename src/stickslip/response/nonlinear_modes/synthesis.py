@@ -18,15 +18,23 @@ import scipy.optimize
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.forced.accepted import accepted_points
+from stickslip.response.forced.problem import forced_problem
+from stickslip.response.forced.response import forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.sdof_oscillator import ModalOscillator
 from stickslip.response.parameter import Discretisation
+from stickslip.response.system import System
 
 POINTS = 161  # amplitudes of a curve, each with a frequency on either side of the resonance
 REAL = 1e-6  # relative imaginary part of a real root: at a double root, rounding enters as a square root
 DIFFERENCE = 1e-5  # step of the position for derivatives
 PEAK_PLACE_RTOL = 1e-9  # tolerance of a peak's position
 TWICE = 2.0
+# share of the level for the first motion of a mode that begins linear; below, responses are proportional to their level
+FAINT_LEVEL = 1e-3
 CONTACT_FORCE_RTOL = 1e-9  # relative difference of contact forces that counts as none
 
 
@@ -337,3 +345,28 @@ def is_homogeneous(oscillator: ModalOscillator, how: Discretisation | None = Non
 def _forces(balance: HarmonicBalance, motion: ComplexArray, omega: float) -> FloatArray:
     x = balance.unknowns(motion)
     return np.asarray(balance.forces(x, omega).coefficients)
+
+
+def level_to_solve(own: ModalOscillator, level: float) -> float:
+    """Return the level to solve: for a very small one a larger one without slip, to which the response is proportional."""
+    faint = FAINT_LEVEL * float(own.needed(np.array([own.begins]))[0])
+    if own.begins == 0.0 or level >= faint or len(resonances(own, faint)) > 1:
+        return level
+    return faint
+
+
+def change_of_peak(coarser: ModalOscillator, found: Resonance) -> float:
+    """Return the relative change of a peak with another oscillator, such as one with every second point of the mode."""
+    other = [r.amplitude for r in resonances(coarser, found.level) if r.top]
+    return min((abs(a / found.amplitude - 1.0) for a in other), default=np.inf)
+
+
+def direct_response(
+    system: System, load: HarmonicLoad, level: float, sweep: Sweep, dof: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies, rad/s, and amplitudes of a coordinate, m, by harmonic balance; `level` is a factor on the harmonic loads."""
+    raised = HarmonicLoad(load.static, {h: level * f for h, f in load.harmonics.items()})
+    linear = forced_problem(system, raised, sweep).high.linear
+    points = accepted_points(list(forced_response(system, raised, sweep)))
+    amplitude = [abs(linear.recover(p.omega, p.coefficients)[1, dof]) if p.converged else np.nan for p in points]
+    return np.array([p.omega for p in points]), np.array(amplitude)

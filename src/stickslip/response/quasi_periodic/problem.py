@@ -31,6 +31,7 @@ from stickslip.solve.linear import solve_with
 from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
+GRID = 64  # phases of each frequency, over which the largest distance from the mean is taken
 LEVELS = 8  # steps of the second load if Newton's method fails at full load
 MOST_RAISES = 6
 FAINT = 0.01  # smallest reference for the change of a coordinate, over the largest coordinate
@@ -452,3 +453,11 @@ def _with_free_tone(balance: TorusBalance, x: FloatArray, at: TorusLinearisation
 def room(problem: TwoTones) -> int:
     """Return the number of combined frequencies that may be added."""
     return MAX_DENSE_UNKNOWNS // (2 * problem.balance.side.n) - len(problem.balance.indices)
+
+
+def farthest(motion: TorusMotion, dofs: IntArray) -> FloatArray:
+    """Return the (k,) largest distances of coordinates from their mean, m, over both phases of a motion."""
+    phases = 2.0 * np.pi * np.arange(GRID) / GRID
+    first, second = np.meshgrid(phases, phases)
+    values = motion.values(dofs, first, second)
+    return np.asarray(np.abs(values - motion.coefficients[0, dofs].real).max(axis=(0, 1)))

@@ -44,6 +44,7 @@ EVALUATIONS_BESIDE = 2  # evaluations for a point of a sweep in addition to one 
 EXACT = 1e-12  # relative residual of sensitivities from an iterative solver ...
 STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
 FOLD_OVERLAP_LOG_OMEGA = 1e-6  # distance in ln ω of a peak beyond its neighbours at a fold
+SWEEPS = 8  # largest number of sweeps, at values spread over the range of peaks followed back
 SAG = 0.02  # largest relative height of a peak above the neighbouring sweep points; at most 0.5 % for 80 peaks
 STANDS_OUT = 1.01  # smallest ratio of a maximum to the higher one of the minima beside it
 
@@ -392,3 +393,37 @@ def _followed(
         if len(found) > FEW and near and abs(point.p - start.p) < CLOSED * (last - first):
             break
     return found
+
+
+def unmet_peaks(
+    search: PeakSearch, points: Sequence[PeakPoint], values: Sequence[float], later: int
+) -> list[tuple[int, float]]:
+    """Return number and value of the peaks that no sweep has confirmed.
+
+    Parameters
+    ----------
+    search
+        Search of the peaks.
+    points
+        All points found.
+    values
+        Values in the order of visits; the peaks of the last one were found by a sweep.
+    later
+        Number of the first peak that was followed back.
+    """
+    back = [p for p in points if p.peak >= later and p.converged and p.is_maximum]
+    places = [i for i, v in enumerate(values[:-1]) if any(p.value == v for p in back)]
+    share = np.linspace(0, len(places) - 1, min(SWEEPS, len(places)))
+    swept = sorted({places[int(i)] for i in share})
+    met: dict[tuple[int, int], bool] = {}
+    for i in swept:
+        here = [p for p in back if p.value == values[i]]
+        met |= {(p.peak, i): own for p, own in zip(here, met_by_a_sweep(search, here), strict=True)}
+
+    def reached(peak: int, i: int) -> bool:
+        # a peak that sweeps meet on both sides of a value would be met there as well
+        before = max((j for j in swept if j <= i), default=-1)
+        after = min((j for j in swept if j >= i), default=len(values) - 1)
+        return met.get((peak, before), False) and met.get((peak, after), False)
+
+    return [(p.peak, p.value) for p in back if p.value != values[-1] and not reached(p.peak, values.index(p.value))]

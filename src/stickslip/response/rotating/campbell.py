@@ -7,16 +7,21 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 import scipy.optimize
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.modes import gyroscopic_modes, normal_modes
+from stickslip.model.modes import gyroscopic_modes, natural_frequencies, normal_modes, with_springs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.contact_coordinates import own_motions
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.waves import excited_wave
+from stickslip.response.system import System
 from stickslip.units import HZ
 
 CLEAR = 0.7  # modal assurance below which a step in speed is halved
@@ -402,3 +407,65 @@ def cyclic_campbell(
 
 def _wave_at(sector_at: Callable[[float], CyclicSector], wave: int, speed: float) -> Structure:
     return travelling_wave(sector_at(speed), wave)
+
+
+def stiffening_of(
+    structure: Structure, hertz: FloatArray, vectors: Matrix, by_square: Matrix, speed: float, *, turning: bool
+) -> FloatArray:
+    """Return the (m,) derivatives of ω² by Ω², from ``φᴴ (K + iωD − ω²M) φ = 0``; changes of φ are of second order.
+
+    Parameters
+    ----------
+    structure
+        The structure at the speed.
+    hertz, vectors
+        (m,) natural frequencies, Hz, and (n, m) shapes.
+    by_square
+        Derivative of the stiffness by Ω² on the dofs of all parts, N s²/m: cyclic faces, joins and springs do not change.
+    speed
+        Ω, rad/s, above zero.
+    turning
+        Whether Coriolis forces act. They grow with Ω; the real part of the damping dissipates, and does not count.
+    """
+    by_x = _form(by_square, structure.expand(vectors))
+    mass, omega = _form(structure.mass, vectors), 2 * np.pi * hertz
+    if not turning:
+        return np.asarray((by_x / mass).real)
+    coriolis = -_form(structure.damping, vectors).imag
+    by_omega = 2 * omega * mass - coriolis
+    return np.asarray((2 * omega * (by_x + omega * coriolis / (2 * speed**2)) / by_omega).real)
+
+
+def _form(matrix: Matrix, vectors: Matrix) -> ComplexArray:
+    """Return ``φᴴ A φ`` of each column."""
+    return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
+
+
+def frequencies_along(system: System, speeds: FloatArray, n_modes: int, *, stuck: bool, coriolis: bool) -> FloatArray:
+    """Return (s, n_modes) natural frequencies along an engine order, Hz; NaN for missing modes.
+
+    Parameters
+    ----------
+    system
+        The system along the engine order.
+    speeds
+        (s,) in rad/s.
+    n_modes
+        Number of modes.
+    stuck
+        Whether all contacts stick, instead of being open.
+    coriolis
+        Whether the damping holds Coriolis forces.
+    """
+    line = cast("SpeedLine", system.structure)
+    found = np.full((len(speeds), n_modes), np.nan)
+    for i, speed in enumerate(speeds):
+        structure = line.at(float(speed)).of_harmonic(1)
+        if stuck:
+            structure = with_springs(structure, system.interface.gap_operator, system.springs.stuck_stiffness())
+        way = own_motions(structure, line.multipliers)  # what its constraints allow
+        structure = in_coordinates(structure, way, structure.dofs.take(np.arange(way.shape[1])), {})
+        count = min(n_modes, structure.n)
+        own = gyroscopic_modes(structure, count).frequencies_hz if coriolis else natural_frequencies(structure, count)
+        found[i, : len(own)] = own
+    return found

@@ -25,6 +25,7 @@ from stickslip.solve.newton_method import Newton, newton
 FIRST, SMALLEST, LARGEST = 1e-4, 1e-9, 1 / 150  # steps over the duration of the sweep
 # error of a step over its difference from the prediction: 2/11 with equal steps
 SHARE = 0.2
+JUDGED_PEAK_SHARE = 0.5  # share of the peak, above which the second derivative is compared with the first
 GROWTH, SHRINK, SAFE = 2.0, 0.3, 0.85
 
 
@@ -323,3 +324,27 @@ def _ahead(points: list[_Step], step: float) -> ComplexArray:
         others = [(time - o.time) / (one.time - o.time) for o in points if o is not one]
         found += np.prod(others) * one.q
     return found
+
+
+def neglected(time: FloatArray, amplitude: ComplexArray, omega: FloatArray) -> float:
+    """Return the ratio of the second derivative of an amplitude to 2ω times the first, around the largest amplitude.
+
+    Parameters
+    ----------
+    time, omega
+        (n,) time, and frequency of the harmonic, s and rad/s.
+    amplitude
+        (n,) complex.
+    """
+    if time.size < 3:
+        return float("nan")
+    before, after = np.diff(time)[:-1], np.diff(time)[1:]
+    slopes = np.diff(amplitude) / np.diff(time)
+    first = (before * slopes[1:] + after * slopes[:-1]) / (before + after)
+    second = 2 * (slopes[1:] - slopes[:-1]) / (before + after)
+    size = np.abs(amplitude[1:-1])
+    near = size > JUDGED_PEAK_SHARE * size.max()
+    weight = (before + after)[near]  # many short steps must not count more
+    there = np.sum(weight * np.abs(second[near]) ** 2)
+    here = np.sum(weight * np.abs(2 * omega[1:-1][near] * first[near]) ** 2)
+    return float(np.sqrt(there / here)) if here > 0.0 else float("nan")

@@ -8,9 +8,12 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.interface import Interface
+from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.blas_threads import by_one_thread
+from stickslip.response.system import System
+from stickslip.response.time.sectors import whole_wheel
 from stickslip.response.time.settling import last_third, overflowed, period_harmonics, remaining_change
 from stickslip.response.time.start import TransientStart
 from stickslip.response.time.stepping.marcher import prepared
@@ -228,3 +231,37 @@ def mixed_start(motions: Sequence[tuple[ComplexArray, float]], like: TransientSt
     moved = sum((a.real for a, _ in motions), np.zeros_like(like.displacement))
     rate = sum(((1j * omega * a).real for a, omega in motions), np.zeros_like(like.velocity))
     return replace(like, displacement=moved, velocity=rate)
+
+
+def all_in_time(
+    system: System, load: HarmonicLoad, output: int, most: int
+) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
+    """Return structure, contacts and static load of all sectors for time integration, and the output of each sector.
+
+    Parameters
+    ----------
+    system
+        A single structure, or the wave of a tuned wheel.
+    load
+        Its load; of a wheel the static load of a sector.
+    output
+        Coordinate of the output.
+    most
+        Largest number of coordinates of all sectors.
+
+    Raises
+    ------
+    StickslipError
+        If the model is too large.
+    """
+    side = system.structure
+    if side.wheel is None:
+        return side, system.interface, load, np.array([output])
+    if side.n * side.wheel.sectors > most:
+        raise StickslipError(
+            f"time integration marches all sectors, {side.n * side.wheel.sectors} coordinates, more than {most}"
+        )
+    whole = whole_wheel(system)
+    own = whole.structure.n // side.wheel.sectors
+    static = np.tile(load.static[:own], side.wheel.sectors)
+    return whole.structure, whole.contacts, HarmonicLoad(static), output + own * np.arange(side.wheel.sectors)

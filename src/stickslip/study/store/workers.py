@@ -17,7 +17,7 @@ from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from stickslip.errors import StickslipError, did_you_mean, input_error, missing_package
-from stickslip.study.store.threads import one_blas_thread
+from stickslip.model.blas_threads import one_blas_thread
 from stickslip.study.store.worker_process import Cell, blas_threads
 
 T = TypeVar("T")

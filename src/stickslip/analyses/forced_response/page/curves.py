@@ -11,9 +11,9 @@ from plotly.subplots import make_subplots
 from stickslip.analyses.forced_response.page.bifurcations import located, mark_bifurcations
 from stickslip.analyses.forced_response.page.many_cases import Panel, extremes, panels
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.page.tractions import draw_bands
 from stickslip.analyses.forced_response.records.columns import OperatingRange, of_cases
 from stickslip.analyses.forced_response.summary import amplitude_name, orders_sentence, several_orders
+from stickslip.analyses.residual_tractions.page import draw_bands
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.report.cases import ShownCase

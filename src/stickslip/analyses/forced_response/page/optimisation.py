@@ -9,8 +9,8 @@ from plotly.subplots import make_subplots
 
 from stickslip.analyses.forced_response.page.many_cases import FEW, all_peaks
 from stickslip.analyses.forced_response.page.response import Response
-from stickslip.analyses.forced_response.page.tractions import draw_peak_bands
 from stickslip.analyses.forced_response.verdicts.working_range import MIN_PEAKS, TITLE, range_lines, working_ranges
+from stickslip.analyses.residual_tractions.page import draw_peak_bands
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.model.readers.measured_columns import same
 from stickslip.report.cases import ShownCase, families_of, first_number

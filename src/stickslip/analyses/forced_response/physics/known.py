@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import STILL_HZ, Question
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.law_check import law_fault
 from stickslip.contact.laws import is_of_a_user
 from stickslip.model.structure import ROTATIONS
 from stickslip.response.forced.choices import RelativeTo
+from stickslip.response.forced.collected import Response
 from stickslip.response.free_motion import drift
 from stickslip.study.verdict import Verdict, doubt
 from stickslip.units import HZ, RPM

@@ -1,34 +1,19 @@
 """Physical limits of a case: damping that is missing, parts that contacts alone hold, dampers that cannot slip, small motions."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import MotionAtPeak, PhysicsVerdicts, stored
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values
-from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import is_of_a_user
-from stickslip.errors import InputError
 from stickslip.response.damper_statics import ANGLES_DEG, DamperStatics, FlankLimits, flanks_of, statics_of
-from stickslip.response.damping_of_modes import (
-    UNDAMPED_RATIO,
-    DampedMode,
-    Friction,
-    Range,
-    RangeMode,
-    damped_modes,
-    friction_of,
-    range_modes,
-    springs_of,
-)
-from stickslip.response.equilibrium import pressed_by
-from stickslip.response.forced.response import ForcedPoint
-from stickslip.response.recovery import damped_share, equivalent_damping, signals
+from stickslip.response.damping_of_modes import UNDAMPED_RATIO, ModesInRange, Range, RangeMode, modes_in_range
+from stickslip.response.forced.collected import Accepted, Response
+from stickslip.response.recovery import damped_share, equivalent_damping, rotation_and_strain, signals
 from stickslip.study.verdict import Verdict, to_json
 from stickslip.units import HZ
 
@@ -110,92 +95,14 @@ ESTIMATE = "this estimate holds within a factor of 1.5, for steady normal forces
 GIVE_DAMPING = "Give the parts their damping ([damping] or part.NAME.damping: a ratio, a loss factor; or aerodynamic coefficients)."
 
 
-@dataclass(frozen=True, eq=False)
-class Physics:
-    """Properties of the modes of a case, known without its response.
-
-    Parameters
-    ----------
-    stuck, sliding
-        Excited modes in the range, with stuck contacts, and with contacts sliding freely where they can.
-    friction
-        Friction forces of the contacts under the static loads.
-    damped
-        Effect of friction on each mode.
-    touching
-        Whether there are contacts.
-    springs
-        (n_contacts, 3) stiffnesses of the contacts that the static loads press, stuck, N/m.
-    """
-
-    stuck: tuple[RangeMode, ...]
-    sliding: tuple[RangeMode, ...]
-    friction: Friction
-    damped: tuple[DampedMode, ...]
-    touching: bool
-    springs: FloatArray
-
-    def where(self, text: str) -> str:
-        """Return words about contacts; empty without contacts."""
-        return text if self.touching else ""
-
-    @property
-    def undamped(self) -> list[RangeMode]:
-        """Excited modes without damping while contacts stick."""
-        return [m for m in self.stuck if m.undamped]
-
-    @property
-    def unbounded(self) -> list[tuple[RangeMode, float]]:
-        """Undamped modes whose load exceeds the bound on friction, with the ratio of both."""
-        each = [(m, m.excess(self.friction)) for m in self.sliding if m.undamped]
-        return [(m, excess) for m, excess in each if 1.0 < excess < np.inf]
-
-    @property
-    def driven(self) -> RangeMode | None:
-        """The mode with the largest linear resonance with contacts stuck; None if the load excites none in the range."""
-        known = [m for m in self.stuck if m.force > 0.0]
-        return max(known, key=lambda m: m.resonance) if known else None
-
-    @property
-    def slip_ratio(self) -> float:
-        """Largest tangential force over its limit at the largest resonance with stuck contacts; NaN without friction or resonance."""
-        top = self.driven
-        if top is None or not self.friction.any:
-            return float("nan")
-        motion = np.abs(top.gaps[:, :2]) * top.resonance
-        force, limits = motion * self.springs[:, :2], self.friction.limits
-        return float(np.max(force[limits > 0.0] / limits[limits > 0.0]))
-
-    def ends(self, mode: RangeMode) -> float:
-        """Return the frequency of a mode with contacts sliding freely, rad/s; its own frequency if friction does not change it."""
-        near = [d for d in self.damped if abs(d.stuck - mode.omega) <= 1e-6 * mode.omega]
-        return near[0].ends if near else mode.omega
-
-
-def physics_of(question: Question) -> Physics | None:
-    """Return the properties of the modes of a case; None without a reduction, or if aerodynamic coefficients end inside the range.
-
-    A mistuned wheel is replaced by the tuned one.
-    """
+def physics_of(question: Question) -> ModesInRange | None:
+    """Return the excited modes of a case, see `modes_in_range`; a mistuned wheel is replaced by the tuned one."""
     model = question.model if question.model.blades is None else question.model.blades.tuned
-    system, load = model.system, model.load
-    if not system.structure.reduced:
-        return None
     within = Range(*sorted(question.sweep.omega_range))
-    friction = friction_of(system.springs, model.static_gap, model.static_force)
-    holds = pressed_by(system.springs.laws, model.static_force)
-    stuck, sliding = springs_of(system, holds), springs_of(system, holds, friction.slips)
-    try:
-        modes = [tuple(range_modes(system, load, within, own)) for own in (stuck, sliding)]
-        harmonics = sorted(h for h, force in load.harmonics.items() if h and np.any(force))
-        damped = [d for h in harmonics for d in damped_modes(system, friction, stuck, h, within)]
-    except InputError:  # the range exceeds the table of aerodynamic coefficients
-        return None
-    touching = bool(system.interface.n_contacts)
-    return Physics(modes[0], modes[1], friction, tuple(damped), touching, np.reshape(stuck, (-1, 3)))
+    return modes_in_range(model.system, model.load, within, model.static_gap, model.static_force)
 
 
-def beforehand(physics: Physics) -> Iterator[Verdict]:
+def beforehand(physics: ModesInRange) -> Iterator[Verdict]:
     """Yield the verdicts of ``stickslip check`` on a case before its solution.
 
     Parameters
@@ -205,7 +112,7 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
     """
     if physics.undamped:
         slip = "only slip bounds it" if physics.friction.any else "nothing bounds it"
-        stick, still = physics.where(" while contacts stick"), physics.where(" where nothing slips")
+        stick, still = _where(physics, " while contacts stick"), _where(physics, " where nothing slips")
         why = f"nothing damps {_modes(physics.undamped)}{stick}: {slip}, and a peak{still} has no finite value"
         yield Verdict("doubtful", why=why, remedy=GIVE_DAMPING)
     yield from _of_bounds(physics)
@@ -213,7 +120,12 @@ def beforehand(physics: Physics) -> Iterator[Verdict]:
     yield from _of_dampers(physics)
 
 
-def driven_line(physics: Physics) -> list[str]:
+def _where(physics: ModesInRange, text: str) -> str:
+    """Return words about contacts; empty without contacts."""
+    return text if physics.touching else ""
+
+
+def driven_line(physics: ModesInRange) -> list[str]:
     """Name the mode in the range with the largest excitation, pressed contacts stuck."""
     top = physics.driven
     if top is None:
@@ -221,11 +133,11 @@ def driven_line(physics: Physics) -> list[str]:
     others = [m for m in physics.stuck if m.force > 0.0 and m is not top]
     beside = f"; it drives {_modes(others)} less" if others else ""
     return [
-        f"the load drives the mode at {top.hz:.2f} Hz most{physics.where(' (pressed contacts stuck): the resonance while nothing slips')}{beside}"
+        f"the load drives the mode at {top.hz:.2f} Hz most{_where(physics, ' (pressed contacts stuck): the resonance while nothing slips')}{beside}"
     ]
 
 
-def afterwards(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
+def afterwards(question: Question, physics: ModesInRange, response: Response) -> Iterator[Verdict]:
     """Yield the verdicts on a solved case: from the energy balance at its peak, and from its modes.
 
     Parameters
@@ -249,15 +161,16 @@ def of_physics(question: Question, response: Response) -> Values:
     return stored(PhysicsVerdicts(physics_verdicts=to_json(told)))
 
 
-def _of_energy(question: Question, physics: Physics, response: Response) -> Iterator[Verdict]:
+def _of_energy(question: Question, physics: ModesInRange, response: Response) -> Iterator[Verdict]:
     """Yield a verdict on an undamped resonance without any dissipation."""
     top = response.top
     if top is None or not physics.undamped:
         return
     known = _damping(question, top)
     if known < UNDAMPED_RATIO and _decided_by_damping(question, top):
-        idle = physics.where(
-            f" while contacts stick, and at the peak nothing slips enough to (equivalent damping {_plain(known)} of critical)"
+        idle = _where(
+            physics,
+            f" while contacts stick, and at the peak nothing slips enough to (equivalent damping {_plain(known)} of critical)",
         )
         why = f"nothing damps {_modes(physics.undamped)}{idle}: the peak has no finite value, the number tells how near to it a frequency was solved"
         yield Verdict("doubtful" if question.sweep.grid.size else "wrong", why=why, remedy=GIVE_DAMPING)
@@ -272,7 +185,7 @@ def _of_energy(question: Question, physics: Physics, response: Response) -> Iter
         # peaks may be missed between listed frequencies, on a followed branch only those limited by damping alone
         missed = question.sweep.grid.size > 0 or _decided_by_damping(question, most)
         if missed and _damping(question, most) < UNDAMPED_RATIO:
-            idle = physics.where(" while contacts stick, and nothing slips where it was solved")
+            idle = _where(physics, " while contacts stick, and nothing slips where it was solved")
             why = f"nothing damps the mode at {mode.hz:.2f} Hz{idle}: a larger peak may stand there"
             remedy = f"{GIVE_DAMPING} Or give more forced_response.points, which find where it slips."
             yield Verdict("doubtful", why=why, remedy=remedy)
@@ -288,7 +201,7 @@ def _decided_by_damping(question: Question, accepted: Accepted) -> bool:
     return not share <= question.limit
 
 
-def _of_bounds(physics: Physics) -> Iterator[Verdict]:
+def _of_bounds(physics: ModesInRange) -> Iterator[Verdict]:
     """Yield a verdict on a load that exceeds the bound on friction."""
     if physics.unbounded:
         mode, excess = max(physics.unbounded, key=lambda own: own[1])
@@ -299,7 +212,7 @@ def _of_bounds(physics: Physics) -> Iterator[Verdict]:
         yield Verdict("wrong", why=why, remedy=f"{GIVE_DAMPING} Or raise the friction.")
 
 
-def _of_bodies(physics: Physics) -> Iterator[Verdict]:
+def _of_bodies(physics: ModesInRange) -> Iterator[Verdict]:
     """Yield a verdict on a part that vibrates alone on its contact springs inside the range."""
     every = [m for m in physics.stuck if m.on_contacts]
     if every:
@@ -312,7 +225,7 @@ def _of_bodies(physics: Physics) -> Iterator[Verdict]:
         yield Verdict("doubtful", why=why, remedy=remedy)
 
 
-def _of_dampers(physics: Physics, moving: str = "", peak_hz: float = np.nan) -> Iterator[Verdict]:
+def _of_dampers(physics: ModesInRange, moving: str = "", peak_hz: float = np.nan) -> Iterator[Verdict]:
     """Yield a note on the effect of friction on the modes near peaks, or the reason why there is no estimate."""
     if not physics.damped:
         return
@@ -365,9 +278,6 @@ def _plain(value: float) -> str:
     return f"{value:.2g}" if abs(value) > 1e-12 else "0"
 
 
-ROTATIONS = ("rx", "ry", "rz")
-
-
 def motion_at_peak(question: Question, response: Response) -> Values:
     """Return rotations and strains of the motion at the peak, which limit linear kinematics; NaN if unknown.
 
@@ -375,33 +285,18 @@ def motion_at_peak(question: Question, response: Response) -> Values:
     clamp to an output; its steepest slope is larger. The strain is the root mean square over the elastic parts; the
     largest strain is larger.
     """
-    none = float("nan")
-    rotation, strain, slipped = none, none, none
+    rotation = strain = slipped = np.nan
     top = response.top
     if top is not None and top.point.converged:
-        rotation, strain = _rotation_and_strain(question, top.point)
+        away, volume = np.zeros(0), np.nan
+        if (extent := question.extent) is not None:
+            known = dict(zip(extent.labels, extent.from_clamp, strict=True))
+            away = np.array([known.get(name, np.nan) for name in question.model.output_labels])
+            volume = extent.stiff_volume
+        rotation, strain = rotation_and_strain(question.problem, top.point, away, volume)
         facet = np.sqrt(question.model.contacts.area)
         if np.any(np.isfinite(facet)):
             gap = signals(question.problem, top.point).gap[:, :2]
             slip = 0.5 * np.hypot(*(np.ptp(gap[:, k], axis=1) for k in range(2)))
             slipped = float(np.nanmax(slip / facet[: len(slip)]))
     return stored(MotionAtPeak(peak_rotation_rad=rotation, peak_strain_rms=strain, peak_slip_facets=slipped))
-
-
-def _rotation_and_strain(question: Question, point: ForcedPoint) -> tuple[float, float]:
-    """Return the largest rotation (rad) and the root mean square of the strain of a motion; NaN where one is not known."""
-    problem, extent = question.problem, question.extent
-    system, linear = problem.system, problem.low.linear
-    strain = float("nan")
-    moved = np.abs(linear.recover(point.omega, point.coefficients))[1:].sum(axis=0)
-    turns = np.array([c in ROTATIONS for c in system.structure.dofs.component], dtype=bool)
-    slopes = [moved[turns]]
-    if extent is not None:
-        away = dict(zip(extent.labels, extent.from_clamp, strict=True))
-        each = np.array([away.get(name, np.nan) for name in question.model.output_labels])
-        slopes.append(moved[system.outputs[: each.size]] / each)
-        energy = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
-        strain = float(np.sqrt(max(4.0 * energy, 0.0) / extent.stiff_volume))
-    known = np.concatenate(slopes)
-    known = known[np.isfinite(known)]
-    return (float(known.max()) if known.size else float("nan")), strain

@@ -6,9 +6,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import Blades, stored
-from stickslip.analyses.forced_response.records.points import Response, collect
 from stickslip.analyses.forced_response.records.values import Values
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.forced.collected import Response, collect
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.study.store.progress import LOG
 from stickslip.units import HZ

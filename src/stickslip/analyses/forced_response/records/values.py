@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyses.forced_response.more_harmonics import ReferenceDoubt
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import (
     MOTION,
@@ -16,7 +15,6 @@ from stickslip.analyses.forced_response.records.columns import (
     Drawn,
     ExaminedRows,
     ModelFacts,
-    MoreHarmonics,
     PeakPeriod,
     PointFields,
     Points,
@@ -25,11 +23,11 @@ from stickslip.analyses.forced_response.records.columns import (
     TimeChecks,
     stored,
 )
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.stability.in_time import Check
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.analyses.forced_response.stability.stable_words import BASES
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, TextArray
+from stickslip.response.forced.collected import Response
 from stickslip.response.forced.from_time import marched_of
 from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import equivalent_damping, signals
@@ -160,19 +158,6 @@ def of_examined(examined: Sequence[Examined], count: int) -> Values:
         stability_sentence=texts(e.sentence for e in rows),
     )
     return stored(examined_rows) | stored(PointStability(motion_stability=word, motion_stability_basis=basis))
-
-
-def of_doubt(doubt: ReferenceDoubt) -> Values:
-    """Return the variables of the check with more harmonics."""
-    return stored(
-        MoreHarmonics(
-            reference_error_percent=100 * doubt.errors,
-            reference_worst_percent=100 * doubt.worst,
-            reference_worst_hz=doubt.frequency_hz,
-            reference_above=doubt.above,
-            reference_sentence=doubt.sentence,
-        )
-    )
 
 
 def _of_case(question: Question, response: Response, shift: tuple[float, float]) -> Values:

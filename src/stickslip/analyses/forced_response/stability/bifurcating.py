@@ -15,7 +15,6 @@ from stickslip.analyses.forced_response.records.columns import (
     SidePoints,
     stored,
 )
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.stability.examination import FLOPS, by_hill, examination_work, hill_work
 from stickslip.analyses.forced_response.stability.stable import Examined, why_not
@@ -25,6 +24,7 @@ from stickslip.errors import StickslipError
 from stickslip.response.bifurcations.found import Bifurcation, Bifurcations
 from stickslip.response.bifurcations.locate import MAX_EXAMINED_MOTIONS, bifurcations
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
+from stickslip.response.forced.collected import Response
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability import Stability, hill_stability, stability
 from stickslip.response.stability.found import Floquet

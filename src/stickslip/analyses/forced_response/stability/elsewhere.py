@@ -4,9 +4,9 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
 from stickslip.analyses.forced_response.records.columns import OtherMotions, stored
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.stability.stable import examine
+from stickslip.response.forced.collected import Accepted, Response
 from stickslip.response.forced.other_motions import ANOTHER, OtherMotion, other_motions
 from stickslip.response.recovery import fields
 from stickslip.units import HZ

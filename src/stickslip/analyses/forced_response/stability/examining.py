@@ -13,7 +13,6 @@ import numpy as np
 
 from stickslip.analyses.forced_response.estimate import SECONDS_OF_DOUBTS
 from stickslip.analyses.forced_response.problem import IN_TIME, STABLE, Question
-from stickslip.analyses.forced_response.records.points import Accepted, Response, collect
 from stickslip.analyses.forced_response.stability.examination import by_hill
 from stickslip.analyses.forced_response.stability.in_time import Check, check_in_time, seconds_in_time
 from stickslip.analyses.forced_response.stability.stable import (
@@ -30,10 +29,11 @@ from stickslip.analyses.forced_response.stability.stable import (
     with_raised,
     without_raised,
 )
-from stickslip.analyses.forced_response.verdicts.curve import branch_length, jumps, stored_energy
+from stickslip.analyses.forced_response.verdicts.curve import branch_length
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError
 from stickslip.model.structure import Structure
+from stickslip.response.forced.collected import Accepted, Response, collect, jumps, stored_energy
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability.course import Course, course_of, has_transitions
 from stickslip.response.stability.found import changes

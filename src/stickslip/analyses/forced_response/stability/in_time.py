@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.harmonic_set import harmonics_of
 from stickslip.harmonic.linear import one_structure
 from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.collected import Accepted, Response
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.stability.missing_harmonics import (
     HARMONICS_FACTOR,

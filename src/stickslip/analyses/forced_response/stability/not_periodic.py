@@ -9,11 +9,11 @@ import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question, too_large
 from stickslip.analyses.forced_response.records.columns import MotionsInTime, stored
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.stability.in_time import KICK, disturbed
 from stickslip.analyses.forced_response.stability.stable import Examined
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
+from stickslip.response.forced.collected import Accepted, Response
 from stickslip.response.quasi_periodic.in_time import KEPT, MAX_PERIODS, MIN_PERIODS, PEAKS, Course, course, statistics
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import rest, start_from_harmonics

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.analyses.forced_response.problem import Question, too_large
-from stickslip.analyses.forced_response.records.points import Accepted, Response
 from stickslip.analyses.forced_response.stability.examination import (
     FLOPS,
     by_hill,
@@ -20,6 +19,7 @@ from stickslip.analyses.forced_response.stability.in_time import Check, seconds_
 from stickslip.arrays import ComplexArray
 from stickslip.errors import InputError, StickslipError
 from stickslip.response.forced.choices import Stage
+from stickslip.response.forced.collected import Accepted, Response
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import Stability, hill_stability, settled_stability
 from stickslip.response.stability.found import UNIT_TOLERANCE, Floquet, modulus_text

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.records.columns import CaseNumbers, ExaminedRows, PointStability, each, read
-from stickslip.analyses.forced_response.records.points import Response
 from stickslip.analyses.forced_response.stability.stable import Examined
+from stickslip.response.forced.collected import Response
 from stickslip.response.stability.found import modulus_text
 from stickslip.study.verdict import said
 from stickslip.units import HZ

@@ -1,9 +1,8 @@
-"""One case of a finished dataset, as the rules of its verdicts see it; missing variables are NaN or empty. Also jumps of its branch."""
+"""One case of a finished dataset, as the rules of its verdicts see it; missing variables are NaN or empty."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,93 +26,11 @@ from stickslip.analyses.forced_response.records.columns import (
     each,
     read,
 )
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.harmonic.harmonic_set import named
 from stickslip.response.forced.amplitude import amplitudes
+from stickslip.response.forced.collected import stored_energy
 from stickslip.solve.status import Status
-
-JUMP = 2.0  # ratio of neighbouring amplitudes that no step along a branch reaches
-LOSS_JUMP = 10.0  # ratio of neighbouring dissipations at a jump
-# step of the dissipation at a jump over the steps beside it; at the onset of slip, neighbouring steps are similar
-LOSS_STEP = 4.0
-LOSS_COUNTS = 0.01  # share of the largest dissipation, below which a jump does not matter
-LOSS_SEEN = 1e-6  # share of the energy stored by the contacts, below which dissipation is rounding
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A step of a branch between two different motions.
-
-    Parameters
-    ----------
-    step
-        Index of the point before it.
-    what
-        Name of the quantity that jumps.
-    size
-        Factor of the jump.
-    """
-
-    step: int
-    what: str
-    size: float
-
-
-def jumps(amplitude: FloatArray, loss: FloatArray, few: BoolArray, elastic: float) -> tuple[Jump, ...]:
-    """Return the steps at which the response jumps.
-
-    Parameters
-    ----------
-    amplitude
-        (n,) amplitudes of consecutive points, m.
-    loss
-        (n,) energy dissipated by all contacts in a cycle, J.
-    few
-        (n,) whether a point keeps the harmonics of the first passage. Such points are connected by arc length; points solved with more may
-        lie anywhere.
-    elastic
-        Largest energy stored by the contacts, J, a scale for the rounding of `loss`.
-    """
-    of_loss = {j.step: j for j in _of_loss(np.maximum(loss, 0.0), elastic)}
-    return tuple(sorted((of_loss | _of_amplitude(amplitude, few)).values(), key=lambda j: j.step))
-
-
-def _of_amplitude(amplitude: FloatArray, few: BoolArray) -> dict[int, Jump]:
-    found = {}
-    for k, (low, high) in enumerate(map(sorted, pairwise(amplitude))):
-        if high > JUMP * low and not (few[k] and few[k + 1]):
-            found[k] = Jump(k, f"amplitude {high / low:.3g} times", float(high / low))
-    return found
-
-
-def _of_loss(loss: FloatArray, elastic: float) -> list[Jump]:
-    """Return the jumps of the dissipation. At the onset of slip it also grows from zero, but in similar steps."""
-    step = np.abs(np.diff(loss))
-    least = max(LOSS_COUNTS * float(loss.max(initial=0.0)), LOSS_SEEN * elastic)
-    found = []
-    for k, (low, high) in enumerate(map(sorted, pairwise(loss))):
-        beside = max([*step[max(k - 1, 0) : k], *step[k + 1 : k + 2]], default=0.0)
-        if low <= LOSS_SEEN * elastic:
-            continue  # no dissipation yet: slip begins here
-        if high > max(least, LOSS_JUMP * low) and step[k] > LOSS_STEP * beside:
-            ratio = float(high / low)
-            found.append(Jump(k, f"dissipation {ratio:.3g} times", ratio))
-    return found
-
-
-def stored_energy(gap: FloatArray | ComplexArray, force: FloatArray | ComplexArray) -> float:
-    """Return the largest energy of all contacts together in a cycle, of order π |force| |gap|, J.
-
-    Parameters
-    ----------
-    gap, force
-        (point, harmonic from 1, contact, ...) coefficients, m and N.
-    """
-    own = [np.moveaxis(x, 2, 1) for x in (gap, force)]
-    sizes = [np.sqrt(np.sum(np.abs(x) ** 2, axis=tuple(range(2, x.ndim)))) for x in own]
-    each = np.sum(sizes[0] * sizes[1], axis=1)
-    return float(np.pi * np.nanmax(each, initial=0.0))
-
 
 DEFAULT_LIMIT = 5.0  # percent, for datasets without a limit
 ATTAINED = 1.0  # percent: largest difference between a settled time integration and the balance

@@ -25,11 +25,12 @@ from stickslip.analyses.forced_response.records.columns import (
     each,
     holds,
 )
-from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, jumps, motion_of
+from stickslip.analyses.forced_response.verdicts.curve import ATTAINED, Curve, motion_of
 from stickslip.analyses.operation import MARGIN
 from stickslip.harmonic.judging import JUDGED_MULTIPLE
 from stickslip.harmonic.strategies import STRATEGIES, VERIFYING
 from stickslip.response.forced.choices import RUNGS
+from stickslip.response.forced.collected import jumps
 from stickslip.solve.status import Status
 from stickslip.study.verdict import Level, from_json
 from stickslip.units import LARGEST_PERCENT, millimetres

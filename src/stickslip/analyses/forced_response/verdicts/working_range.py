@@ -9,9 +9,10 @@ import numpy as np
 import xarray as xr
 
 from stickslip.analyses.forced_response.records.columns import CaseNumbers, PeakPeriod, Verdicts, holds, of_cases
-from stickslip.analyses.forced_response.verdicts.curve import LOSS_SEEN, Curve
+from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
+from stickslip.response.forced.collected import LOSS_SEEN
 from stickslip.study.coordinates import families, first_varied_number, naming_of
 from stickslip.study.file.case_names import Naming
 from stickslip.study.verdict import LEVELS, said, together
