@@ -16,17 +16,21 @@ from evidence.models.annulus import annular_sector
 from stickslip.assembly.assembling import assemble
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.forces import Load, Output
+from stickslip.assembly.joints.cyclic_faces import _face, unlike_faces
 from stickslip.assembly.model import Model
+from stickslip.assembly.sides.mistuning import BladeMistuning, Mistuning
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.facets import lumped_areas
 from stickslip.model.mesh.solid_mesh import SolidMesh, facets_of
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
 from stickslip.reduction.choice import Reduction
+from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.response.system import System
 
@@ -109,19 +113,31 @@ def test_frequencies_converge_to_the_torsion_of_the_free_ring_and_to_those_of_a_
     assert np.max(errors[1]) < 0.012
 
 
-def test_which_face_follows_changes_little():
-    mesh = unlike_wedge(SECTORS, (4, 3), (3, 2), clamp=True)
+def mirrored(mesh):
+    """Return the mesh mirrored at the plane y = 0, with the cyclic faces exchanged."""
     sets = dict(mesh.node_sets)
     sets["cyclic_low"], sets["cyclic_high"] = sets["cyclic_high"], sets["cyclic_low"]
     order = [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]
-    mirrored = SolidMesh(mesh.points * [1, -1, 1], mesh.cells[:, order], sets)
-    one, other = (natural_frequencies(ring(m, clamped=("root",)).at(0.0, 2), 5) for m in (mesh, mirrored))
-    assert 1e-9 < np.abs(one / other - 1).max() < 0.01
+    return SolidMesh(mesh.points * [1, -1, 1], mesh.cells[:, order], sets)
 
 
-def test_the_waves_of_a_turning_wheel_have_all_frequencies_of_the_whole():
+@pytest.mark.parametrize("ahead", [1, -1])
+def test_which_face_follows_changes_little(ahead):
+    """The finer face follows: the mirrored mesh has the same frequencies, and the coarser face as follower moves them by less than 1 %."""
+    mesh = unlike_wedge(SECTORS, (4, 3), (3, 2), clamp=True)
+    part, other = (ring(m, clamped=("root",)).parts["ring"] for m in (mesh, mirrored(mesh)))
+    assert (unlike_faces(part).ahead, unlike_faces(other).ahead) == (-1, 1)
+    one, two = (natural_frequencies(travelling_wave(unlike_faces(p), 2), 5) for p in (part, other))
+    np.testing.assert_allclose(two, one, rtol=1e-9)
+    forced = natural_frequencies(travelling_wave(unlike_faces(part, ahead), 2), 5)
+    assert (ahead < 0) == (np.abs(forced / one - 1).max() < 1e-9)
+    assert np.abs(forced / one - 1).max() < 0.01
+
+
+@pytest.mark.parametrize(("low", "high"), [((2, 2), (3, 1)), ((3, 2), (2, 1))])
+def test_the_waves_of_a_turning_wheel_have_all_frequencies_of_the_whole(low, high):
     """Centrifugal stiffness and Coriolis forces at speed; clamped nodes on the faces."""
-    model = ring(unlike_wedge(5, (2, 2), (3, 1), clamp=True), 5, ("root",), speed=300.0)
+    model = ring(unlike_wedge(5, low, high, clamp=True), 5, ("root",), speed=300.0)
     sector = model.neighbours.sector(model.full(300.0), model.coordinates)
     assert sector.weights is not None
     whole = natural_frequencies(wheel(sector), 15)
@@ -129,11 +145,12 @@ def test_the_waves_of_a_turning_wheel_have_all_frequencies_of_the_whole():
     np.testing.assert_allclose(np.sort(waves)[:15], whole, rtol=1e-9)
 
 
-def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
+@pytest.mark.parametrize(("low", "high"), [((1, 1), (2, 1)), ((2, 1), (1, 1))])
+def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel(low, high):
     """Contacts on the rim, nodes of both faces among them; rotation with Coriolis forces, slip; reduced and not."""
     law = ElasticCoulomb(k_t=2e7, k_w=2e7, k_n=4e7, mu=0.3, preload=300.0)
     order, speed = 2, 300.0
-    mesh = unlike_wedge(5, (1, 1), (2, 1), clamp=True)
+    mesh = unlike_wedge(5, low, high, clamp=True)
     rim = mesh.node_sets["rim"]
     mesh = replace(mesh, node_sets={**mesh.node_sets, "tip": rim[np.abs(mesh.points[rim, 1]) < 1e-9][:1]})
     model = ring(
@@ -180,6 +197,48 @@ def test_friction_on_a_turning_sector_is_that_of_the_whole_wheel():
     few = assemble(replace(model, parts={"ring": replace(damped, reduction=Reduction(12))}), 3)
     for one, every in zip(answered(few.system, few.load, hertz), mine, strict=True):
         assert np.abs(one.outputs - every.outputs).max() < 0.01 * np.abs(every.outputs).max()
+
+
+def test_a_mistuned_wheel_and_its_mirror_image_have_the_same_frequencies():
+    """Either face follows; deviations of a set with the leading face, and contacts to which both faces belong."""
+    deviations = np.array([0.02, -0.03, 0.05, 0.0, -0.01])
+    law = ElasticCoulomb(k_t=2e7, k_w=2e7, k_n=4e7, mu=0.3, preload=300.0)
+    found = []
+    mesh = unlike_wedge(5, (2, 1), (1, 1), clamp=True)
+    for of, follows, values in (
+        (mesh, "low", deviations),
+        (mirrored(mesh), "high", np.roll(deviations[::-1], 1)),
+    ):
+        outer = np.flatnonzero(np.linalg.norm(of.points[:, :2], axis=1) > 0.6)
+        outer = np.setdiff1d(outer, of.node_sets[f"cyclic_{follows}"])
+        model = ring(
+            replace(of, node_sets={**of.node_sets, "outer": outer}),
+            5,
+            ("root",),
+            contacts={"rim": Contact(between=("ring.rim", "ground"), law=law)},
+            outputs=(Output(name="tip", on="ring.outer"),),
+            mistuning=Mistuning(blades={"b": BladeMistuning(of="ring.outer", deviations=values)}),
+        )
+        wheel = assemble(model, 1)
+        found.append(natural_frequencies(wheel.bare.stuck_structure(), 12))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
+    assert np.diff(found[0])[:5].max() > 1.0  # pairs of waves are split
+
+
+def test_clamped_facets_beside_a_cut_face_do_not_belong_to_it():
+    """The low face has its edge of the clamped surface, free; the high one lacks it, clamped."""
+    mesh = unlike_wedge(SECTORS, (3, 2), (2, 2), clamp=True)
+    angle = np.arctan2(mesh.points[:, 1], mesh.points[:, 0]) + np.pi / SECTORS
+    low = np.flatnonzero(np.abs(angle) < 1e-9)
+    root = np.setdiff1d(mesh.node_sets["root"], low)
+    mesh = replace(mesh, node_sets={**mesh.node_sets, "cyclic_low": low, "root": root})
+    part = ring(mesh, clamped=("root",)).parts["ring"]
+    (surface, _), (other, _) = (_face(part, name) for name in part.faces)
+    assert np.abs(np.arctan2(surface.points[:, 1], surface.points[:, 0]) + np.pi / SECTORS).max() < 1e-9
+    assert np.abs(np.arctan2(other.points[:, 1], other.points[:, 0]) - np.pi / SECTORS).max() < 1e-9
+    areas = [lumped_areas(side.points, side.facets).sum() for side in (surface, other)]
+    np.testing.assert_allclose(areas, 0.5 * 0.2, rtol=1e-9)
+    assert unlike_faces(part).ahead == -1
 
 
 def test_a_join_with_the_next_sector_ties_the_same_faces(free):

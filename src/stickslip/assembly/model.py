@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Skin
-from stickslip.assembly.contact import ALONE, Contact, Join
+from stickslip.assembly.contact import ALONE, NEXT, Contact, Join
 from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.forces import Load, Output, beyond_sectors, doubtful_fields, engine_order, far_outputs
 from stickslip.assembly.joints.cyclic_faces import uncoupled, untied_faces
@@ -218,7 +218,8 @@ class Model:
 
     @cached_property
     def _unjoined(self) -> Neighbours | None:
-        return None if is_staged(self.joins) else neighbours(self.places, self.parts)
+        onward = any(name.startswith(NEXT) for join in self.joins.values() for name in join.between)
+        return None if is_staged(self.joins) else neighbours(self.places, self.parts, joined=onward)
 
     @cached_property
     def stages(self) -> Multistage | None:

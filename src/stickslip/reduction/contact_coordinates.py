@@ -32,7 +32,7 @@ class NodalCoordinates:
     Parameters
     ----------
     ahead
-        (m,) sectors by which the phase of each old coordinate is ahead.
+        (m,) sectors by which the phase of each old coordinate is ahead; -1: behind.
     copied
         (c,) old coordinate of each copy.
     farther
@@ -91,7 +91,7 @@ class NodalCoordinates:
         """Return the table of dofs; copies have the name of the neighbour whose motion they describe."""
         copies = dofs.take(self.copied)
         parts = tuple(
-            "next." * int(s) + p if p else "next." * int(s - 1) + "next"
+            _beside(int(s)) + p if p else _beside(int(s)).removesuffix(".")
             for s, p in zip(self.farther, copies.part, strict=True)
         )
         held = tuple(f"tie_{c}" for c in copies.component)
@@ -99,6 +99,11 @@ class NodalCoordinates:
         return Dofs(
             joined.node, dofs.component + copies.component + held, joined.position, (*dofs.part, *parts, *parts)
         )
+
+
+def _beside(sectors: int) -> str:
+    """Return the prefix of a neighbour's part."""
+    return "next." * sectors if sectors > 0 else "previous." * -sectors
 
 
 def nodal_coordinates(
@@ -132,16 +137,11 @@ def nodal_coordinates(
             f"{sector.structure.dofs.labels[shared[0]]} lies on the axis, where a contact has a coordinate in few waves alone",
             "Leave it out, or take the wheel of all sectors (reduced_wheel).",
         )
-    tie = sector.tie[:, : sector.independent.size][:, place]
-    high = np.zeros(sector.structure.n)
-    high[sector.high] = 1.0
-    tied, free = (scipy.sparse.diags_array(d) @ tie for d in (high, 1.0 - high))
-    # dependence of the gaps on a coordinate in its own phase, one sector and two sectors ahead
-    known = [own @ free, own @ tied + following @ free, following @ tied]
+    known, sectors = gaps_by_sector(sector, place, (own, following))
     phases = np.array([(abs(part) > 0).sum(axis=0) > 0 for part in known]).reshape(3, -1)
     first = np.argmax(phases, axis=0)
     ahead = np.zeros(n, dtype=np.int64)
-    ahead[: place.size] = first
+    ahead[: place.size] = sectors[first]
     again = phases.copy()
     again[first, np.arange(place.size)] = False
     shift, copied = np.nonzero(again)
@@ -151,7 +151,31 @@ def nodal_coordinates(
         operator[:, mine] = part[:, mine].toarray()
         copies = np.flatnonzero(shift == s)
         operator[:, n + copies] = part[:, copied[copies]].toarray()
-    return NodalCoordinates(ahead, copied, shift - first[copied], operator)
+    return NodalCoordinates(ahead, copied, sectors[shift] - sectors[first[copied]], operator)
+
+
+def gaps_by_sector(
+    sector: CyclicSector, place: IntArray, gaps: tuple[Matrix, Matrix]
+) -> tuple[tuple[Matrix, Matrix, Matrix], IntArray]:
+    """Return the dependence of gaps on independent dofs of three sectors, and the numbers (3,) of sectors ahead, own one first.
+
+    Parameters
+    ----------
+    sector
+        One sector.
+    place
+        (m,) positions among its independent dofs.
+    gaps
+        Operators (3 n_contacts, n_sector) on this sector and on the next one.
+    """
+    own, following = gaps
+    tie = sector.tie[:, : sector.independent.size][:, place]
+    follows = np.zeros(sector.structure.n)
+    follows[sector.followers] = 1.0
+    tied, free = (scipy.sparse.diags_array(d) @ tie for d in (follows, 1.0 - follows))
+    if sector.ahead > 0:
+        return (own @ free, own @ tied + following @ free, following @ tied), np.array([0, 1, 2])
+    return (own @ free + following @ tied, following @ free, own @ tied), np.array([0, 1, -1])
 
 
 def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:

@@ -404,7 +404,7 @@ def _refuse_fine(side: Circles, name: str, sectors: int, harmonics: Sequence[int
 def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
     """Return the circles on which the nodes with the dofs `members` lie.
 
-    A node on the high cut face is left out, since it is a copy of a node on the low face.
+    A node on the cut face that follows is left out, since it is a copy of a place on the other face.
 
     Raises
     ------
@@ -415,7 +415,7 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
     if sector.axis is None:
         raise input_error(where, "has no axis", "Give the sector of a model with geometry.")
     dofs = sector.structure.dofs
-    members = np.setdiff1d(members, np.setdiff1d(sector.high, sector.shared))
+    members = np.setdiff1d(members, np.setdiff1d(sector.followers, sector.shared))
     table = node_table(dofs.take(members))[:, :3]
     if not len(table):
         raise input_error(where, "has no free node on the flange", "Name the nodes of the flange.")

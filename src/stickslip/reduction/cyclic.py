@@ -292,7 +292,7 @@ def _other_components(low: Face, high: Face, here: int, there: int) -> InputErro
 
 @dataclass(frozen=True, eq=False)
 class CyclicSector:
-    """A sector of a wheel and its coupling to the neighbours: ``u_high = e^{iθ} R u_low``.
+    """A sector of a wheel and its coupling to the neighbours: ``u_high = e^{iθ} R u_low``, or ``u_low = e^{−iθ} Rᵀ u_high``.
 
     `cyclic_sector` makes one from geometry. A lumped sector is made directly, with ``axis=None``: its coordinates are
     scalars with the same meaning in every sector. The coordinates `high` are a massless copy of the neighbour's coordinates,
@@ -312,8 +312,11 @@ class CyclicSector:
     axis
         Axis of rotation; None for scalar coordinates, which do not rotate.
     weights
-        (m_high, m_low) weights for faces with different meshes: each dof of `high` follows the dofs of `low` with the weights of its
-        row, which add up to one and are the same for all components of a node; None: each dof follows its partner.
+        Weights for faces with different meshes, (m_high, m_low), or (m_low, m_high) if the low face follows: each dof of the face that
+        follows has a row, which adds up to one and is the same for all components of a node; None: each dof follows its partner.
+    ahead
+        Sectors by which the face that leads lies ahead of the face that follows. 1: the high face follows the low face of the next
+        sector; −1: the low face follows the high face of the previous one.
 
     Raises
     ------
@@ -327,20 +330,25 @@ class CyclicSector:
     high: IntArray
     axis: Axis | None = field(default_factory=Axis)
     weights: Matrix | None = None
+    ahead: int = 1
 
     def __post_init__(self) -> None:
         check_sectors("CyclicSector", self.sectors)
         low, high = (np.asarray(side, dtype=np.int64) for side in (self.low, self.high))
         object.__setattr__(self, "low", low)
         object.__setattr__(self, "high", high)
+        if self.ahead not in (1, -1):
+            raise input_error(
+                "CyclicSector: ahead", f"is {self.ahead}", "Give 1 or −1: the high or the low face follows."
+            )
         wanted = low.shape + low.shape if self.weights is None else self.weights.shape
-        if high.shape + low.shape != wanted or low.ndim != 1:
+        if self.followers.shape + self.leaders.shape != wanted or low.ndim != 1:
             raise input_error(
                 "CyclicSector: low, high",
                 f"have shapes {low.shape} and {high.shape}",
                 "Give each dof of one face and its partner on the other, or weights (high, low).",
             )
-        both = np.concatenate([low, high[self._tied()[0]]])
+        both = np.concatenate([self.leaders, self.followers[self._tied()[0]]])
         if both.size and (both.min() < 0 or both.max() >= self.structure.n):
             raise input_error(
                 "CyclicSector: low, high",
@@ -366,32 +374,42 @@ class CyclicSector:
         return 2 * math.pi / self.sectors
 
     @property
+    def followers(self) -> IntArray:
+        """Dofs of the face that follows, and dofs that all sectors share."""
+        return self.high if self.ahead > 0 else self.low
+
+    @property
+    def leaders(self) -> IntArray:
+        """Dofs of the face that leads, and dofs that all sectors share."""
+        return self.low if self.ahead > 0 else self.high
+
+    @property
     def independent(self) -> IntArray:
-        """Dofs that neither follow the low face nor lie on the axis, in the structure's order."""
-        return np.setdiff1d(np.arange(self.structure.n), self.high)
+        """Dofs that neither follow a neighbour nor lie on the axis, in the structure's order."""
+        return np.setdiff1d(np.arange(self.structure.n), self.followers)
 
     @property
     def shared(self) -> IntArray:
         """Dofs that all sectors share, on the axis or of a hub."""
-        return np.asarray(self.high[~self._tied()[0]])
+        return np.asarray(self.followers[~self._tied()[0]])
 
     @property
     def following(self) -> tuple[IntArray, IntArray, Matrix]:
-        """Dependent dofs of the high face, dofs of the low face on which they depend, and CSR weights (dependent, independent)."""
-        high, low = self._tied()
+        """Dependent dofs of one face, dofs of the other on which they depend, and CSR weights (dependent, independent)."""
+        follow, lead = self._tied()
         weights = (
-            scipy.sparse.eye_array(high.sum(), format="csr")
+            scipy.sparse.eye_array(follow.sum(), format="csr")
             if self.weights is None
-            else scipy.sparse.csr_array(self.weights)[high][:, low]
+            else scipy.sparse.csr_array(self.weights)[follow][:, lead]
         )
-        return self.high[high], self.low[low], weights
+        return self.followers[follow], self.leaders[lead], weights
 
     def _tied(self) -> tuple[BoolArray, BoolArray]:
-        """Return masks of the dofs of the high and of the low face that are not shared by all sectors."""
+        """Return masks of the dofs of the following and of the leading face that are not shared by all sectors."""
         if self.weights is None:
             differ = self.low != self.high
             return differ, differ
-        return ~np.isin(self.high, self.low), ~np.isin(self.low, self.high)
+        return ~np.isin(self.followers, self.leaders), ~np.isin(self.leaders, self.followers)
 
     @property
     def tie(self) -> Matrix:
@@ -415,10 +433,10 @@ class CyclicSector:
         phase = wave(wave_number, self.sectors).phase
         n, free = self.structure.n, self.independent
         own = ones_at(free, np.arange(free.size), (n, free.size))
-        high, low, weights = self.following
-        turn = phase * self._turn(low, 1)
-        into = ones_at(high, np.arange(high.size), (n, high.size))
-        tie = own + into @ (weights @ turn) @ own[low]
+        follow, lead, weights = self.following
+        turn = (phase if self.ahead > 0 else np.conj(phase)) * self._turn(lead, self.ahead)
+        into = ones_at(follow, np.arange(follow.size), (n, follow.size))
+        tie = own + into @ (weights @ turn) @ own[lead]
         return scipy.sparse.hstack([tie, self._whirl(phase)], format="csr")
 
     def turn(self, sectors: int) -> Matrix:
@@ -516,7 +534,7 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
     -------
     Structure
         Complex, or real for standing waves of real sectors; Hermitian, and CSR, if the sector's matrices are. Its coordinates are the
-        sector's coordinates without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
+        sector's coordinates without the face that follows; sets whose dofs are among them survive. `basis` leads to the sector's
         displacements, or to the model that was reduced to the sector.
     """
     tie = sector.wave_tie(wave_number)

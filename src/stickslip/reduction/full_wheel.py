@@ -23,7 +23,7 @@ def wheel(sector: CyclicSector) -> Structure:
     Returns
     -------
     Structure
-        CSR. Coordinates: sector by sector the dofs without the high face, then the dofs that all sectors share. A set of the
+        CSR. Coordinates: sector by sector the dofs without the face that follows, then the dofs that all sectors share. A set of the
         sector becomes a set of the whole wheel, sector by sector, and a set of each sector, such as ``sector3.tip``. `basis` is
         None, since the coordinates are the full field. For a reduced sector it leads to the stacked full models of the
         sectors, each in the axes of its own sector.
@@ -128,10 +128,10 @@ def _from_wheel(sector: CyclicSector, number: int) -> Matrix:
     column = number * free.size + np.arange(free.size)
     column = np.concatenate([column, sector.sectors * free.size + np.arange(shared.size)])
     glob = ones_at(own, column, (structure.n, size))
-    high, low, weights = sector.following
-    next_one = (number + 1) % sector.sectors * free.size + np.searchsorted(free, low)
-    followed = ones_at(np.arange(low.size), next_one, (low.size, size))
-    glob = glob + ones_at(high, np.arange(high.size), (structure.n, high.size)) @ weights @ followed
+    follow, lead, weights = sector.following
+    neighbour = (number + sector.ahead) % sector.sectors * free.size + np.searchsorted(free, lead)
+    followed = ones_at(np.arange(lead.size), neighbour, (lead.size, size))
+    glob = glob + ones_at(follow, np.arange(follow.size), (structure.n, follow.size)) @ weights @ followed
     return sector.turn(-number) @ glob
 
 

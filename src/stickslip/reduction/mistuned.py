@@ -50,22 +50,24 @@ def strip(blocks: Matrix, sector: int) -> Matrix:
     return blocks[behind].transpose(1, 0, 2).reshape(rows, len(blocks) * columns)
 
 
-def repeated(operators: Sequence[Matrix], sectors: int) -> Matrix:
-    """Return the CSR operator of all sectors from a sector's operators on itself, on the next sector, on the one after and so on.
+def repeated(operators: Sequence[Matrix], sectors: int, ahead: Sequence[int] | None = None) -> Matrix:
+    """Return the CSR operator of all sectors from a sector's operators on itself and on others.
 
     Parameters
     ----------
     operators
-        (r, m) operators on the sectors 0, 1, 2, ... ahead.
+        (r, m) operators on the sectors `ahead`.
     sectors
         Number of sectors n_s; rows and columns go sector by sector.
+    ahead
+        Sectors by which these lie ahead; None: 0, 1, 2, ...
     """
     rows, columns = operators[0].shape
     entries: list[tuple[FloatArray, IntArray, IntArray]] = []
-    for ahead, operator in enumerate(operators):
+    for step, operator in zip(range(len(operators)) if ahead is None else ahead, operators, strict=True):
         own = scipy.sparse.csr_array(operator).tocoo()
         for n in range(sectors):
-            other = (n + ahead) % sectors
+            other = (n + step) % sectors
             entries.append((own.data, own.row + n * rows, own.col + other * columns))
     data, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
     shape = (sectors * rows, sectors * columns)

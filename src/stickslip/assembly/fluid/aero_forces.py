@@ -162,15 +162,15 @@ class Flow:
         here, pairs = model.neighbours, model.pairs
         pressed = self.holds if given.contacts == "static" and pairs.names else None
         met = (pairs.own, pairs.following, repr(pairs.laws), given.contacts, pressed)
-        faces = () if here is None else (here.low, here.high, here.weights)
+        faces = () if here is None else (here.low, here.high, here.weights, here.ahead)
         tie = model.coordinates.tie
         return content_hash("aero: phases of own dofs", self._whole, model.sectors, given.modes, what, met, faces, tie)
 
 
 def own_dofs(model: Model) -> IntArray:
-    """Return the sector's own dofs of all parts, without those that follow the neighbour a phase angle ahead."""
+    """Return the sector's own dofs of all parts, without those that follow a neighbour."""
     here = model.neighbours
-    following = np.zeros(0, dtype=np.int64) if here is None else np.setdiff1d(here.high, here.low)
+    following = np.zeros(0, dtype=np.int64) if here is None else np.setdiff1d(here.followers, here.leaders)
     return np.setdiff1d(np.arange(model.places.n), following)
 
 

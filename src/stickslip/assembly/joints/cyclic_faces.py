@@ -1,6 +1,6 @@
 """Cyclic faces of a sector: ties of meshes that do not match, and faces that nothing holds.
 
-A high face with another mesh follows the low face of the next sector by a mortar tie. A face that would meet its copies in the
+Of faces with different meshes the finer one follows the other by a mortar tie. A face that would meet its copies in the
 neighbouring sectors, though neither tie nor contact holds them, is refused.
 """
 
@@ -25,16 +25,20 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.waves import check_sectors
 
 KEY = "cyclic"
+SMOOTH = 0.7  # smallest cosine between normals of neighbouring facets of one face
 ON_AXIS = 1e-5  # relative to the size of a face, m/m
 
 
-def unlike_faces(part: Part) -> CyclicSector:
+def unlike_faces(part: Part, ahead: int | None = None) -> CyclicSector:
     """Tie the cyclic faces of a sector by the mortar method.
 
     Parameters
     ----------
     part
         Part with a mesh. Nodes of its faces are clamped in all directions or in none.
+    ahead
+        Which face follows, as in `CyclicSector`; None: the one with more free nodes, since each of its nodes then follows few
+        others. The matrices of a sector of 95,589 dofs have 12 instead of 34 million entries so.
 
     Raises
     ------
@@ -49,18 +53,21 @@ def unlike_faces(part: Part) -> CyclicSector:
             "needs a mesh, whose facets are the faces",
             "Give the mesh beside the matrices, or match the faces node by node.",
         )
-    low, high = (_face(part, name) for name in part.faces)
-    pitch = 2 * np.pi / part.sectors
-    ahead = Surface(part.axis.turned(low[0].points, pitch), low[0].displacement, low[0].facets, None, low[0].numbers)
-    at_rest = np.all(high[1] < 0, axis=1)
+    sides = [_face(part, name) for name in part.faces]
+    moves = [np.flatnonzero(np.all(rows >= 0, axis=1)) for _, rows in sides]
+    if ahead is None:
+        ahead = -1 if moves[0].size > moves[1].size else 1
+    follows, leads = (1, 0) if ahead > 0 else (0, 1)
+    (follower, rows), (leader, _) = sides[follows], sides[leads]
+    there = part.axis.turned(leader.points, ahead * 2 * np.pi / part.sectors)
+    neighbour = Surface(there, leader.displacement, leader.facets, None, leader.numbers)
     try:
-        weights = mortar_tie(high[0], ahead, held=at_rest)
+        weights = mortar_tie(follower, neighbour, held=np.all(rows < 0, axis=1))
     except InputError as error:
-        raise _told(part, error) from None
-    moves = np.flatnonzero(~at_rest), np.flatnonzero(np.all(low[1] >= 0, axis=1))
-    block = scipy.sparse.kron(weights[moves[0]][:, moves[1]], np.eye(3))
-    dofs = low[1][moves[1]].ravel(), high[1][moves[0]].ravel()
-    return CyclicSector(part.structure, part.sectors, *dofs, part.axis, scipy.sparse.csr_array(block))
+        raise _told(part, error, ahead) from None
+    block = scipy.sparse.kron(weights[moves[follows]][:, moves[leads]], np.eye(3))
+    low, high = (rows[free].ravel() for (_, rows), free in zip(sides, moves, strict=True))
+    return CyclicSector(part.structure, part.sectors, low, high, part.axis, scipy.sparse.csr_array(block), ahead)
 
 
 def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
@@ -71,7 +78,7 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
     if free is None:
         raise input_error(KEY, f"there is no set {name!r} in the mesh", "Name both faces.")
     facets = facets_of(mesh, np.union1d(free, np.flatnonzero(held)))
-    facets = facets[np.isin(facets, free).any(axis=1)]
+    facets = facets[_on_face(mesh, facets, free)]
     own = facets >= 0
     nodes, number = np.unique(facets[own], return_inverse=True)
     place = np.full(facets.shape, -1)
@@ -97,17 +104,36 @@ def _face(part: Part, name: str) -> tuple[Surface, IntArray]:
     return surface, rows
 
 
+def _on_face(mesh: SolidMesh, facets: IntArray, members: IntArray) -> BoolArray:
+    """Return whether facets of a face's nodes and of clamped nodes lie on the face, not on a clamped surface beside it.
+
+    A set may lack clamped nodes: facets with nodes outside of the set count if they touch the set and continue its facets.
+    """
+    _, normal = _facets(mesh.points, facets)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    here = np.isin(facets, members)
+    inside = (here | (facets < 0)).all(axis=1)
+    around = np.zeros((len(mesh.points), 3))
+    row, column = np.nonzero(here & inside[:, None])
+    np.add.at(around, facets[row, column], normal[row])
+    mean = np.where(here[:, :, None], around[facets], 0.0).sum(axis=1)
+    length = np.linalg.norm(mean, axis=1)
+    continues = np.einsum("fc,fc->f", mean, normal) >= SMOOTH * length  # also without such facets: zero
+    return np.asarray(inside | (here.any(axis=1) & continues))
+
+
 def _held(structure: Structure, numbers: IntArray) -> BoolArray:
     """Return whether each node of a mesh has no dof."""
     return np.asarray(~(node_rows(structure.dofs, numbers) >= 0).any(axis=1))
 
 
-def _told(part: Part, error: InputError) -> InputError:
+def _told(part: Part, error: InputError, ahead: int) -> InputError:
     """Return an error that names the faces instead of the sides of a pairing."""
     low, high = part.faces
+    a, b = (high, f"{low!r} of the next sector") if ahead > 0 else (low, f"{high!r} of the previous sector")
     return input_error(
         KEY,
-        error.problem.replace("side A", repr(high)).replace("side B", f"{low!r} of the next sector"),
+        error.problem.replace("side A", repr(a)).replace("side B", b),
         "Check that the faces have the same outline, the number of sectors and the axis.",
     )
 

@@ -38,7 +38,7 @@ class Deviation:
     change
         Couplings (n_s, r, m) of these rows with all coordinates -> changes of the matrices of the wheel.
     behind
-        (r, N) CSR contribution of the previous sector to each component; None: no contribution.
+        (r, N) CSR contribution of the sector that follows to each component; None: no contribution.
     """
 
     rows: Matrix
@@ -74,8 +74,7 @@ class Blade:
     whole
         Whether the blade is the whole part, without a fixed boundary.
     behind
-        (b, N) CSR from the previous sector, whose high face has these dofs, to the same forces; None: no dof lies on a
-        face.
+        (b, N) CSR from the neighbour whose face follows these dofs to the same forces; None: no dof lies on a face.
     """
 
     stiffness: Matrix
@@ -106,7 +105,8 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
         raise input_error(place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part.")
     K, M = (scipy.sparse.csr_array(m) for m in (structure.stiffness, structure.mass))
     wide = picked(first + np.arange(structure.n), n)
-    sector = faces_of(head, part) if part.sectors > 1 else None
+    here = model.neighbours
+    sector = None if here is None or part.sectors < 2 else faces_of(head, part, here.ahead)
     if own.size == structure.n:
         return Blade(K, M, K @ wide, whole=True)
     if np.isin(first + own, np.concatenate([model.ties.low, model.ties.high])).any():
@@ -118,24 +118,25 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
     if sector is None:
         return Blade(K[own][:, own], M[own][:, own], K[own] @ wide, whole=False)
     own = _of_one_blade(sector, own, of, place)
-    # a dof of the low face is also on the high face of the previous sector, whose matrices act on it, too
-    here, there = own_and_onward(sector, own)
+    # a dof of the face that leads is also on the face of a neighbour that follows, whose matrices act on it, too
+    own_one, there = own_and_onward(sector, own)
     behind = (there.T @ K @ wide).tocsr() if there.nnz else None
-    stiffness, mass = (scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M))
-    rows = scipy.sparse.csr_array(here.T @ K @ wide)
+    stiffness, mass = (scipy.sparse.csr_array(own_one.T @ m @ own_one + there.T @ m @ there) for m in (K, M))
+    rows = scipy.sparse.csr_array(own_one.T @ K @ wide)
     return Blade(stiffness, mass, rows, whole=False, behind=behind)
 
 
 def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> IntArray:
-    """Return the dofs of a blade without the dofs of the high face, which belong to the next blade."""
+    """Return the dofs of a blade without the dofs of the face that follows, which belong to a neighbour."""
     if np.isin(own, sector.shared).any():
         raise input_error(place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out.")
-    left = np.setdiff1d(own, sector.high)
+    left = np.setdiff1d(own, sector.followers)
     if np.setdiff1d(leaders(sector, own), left).size:
+        follows, leads, beside = ("high", "low", "next") if sector.ahead > 0 else ("low", "high", "previous")
         raise input_error(
             place,
-            f"{of!r} has dofs of the high cyclic face, which belong to the next blade, but not their partners on the low face",
-            "Take the partners on the low face into the set, or leave the face out.",
+            f"{of!r} has dofs of the {follows} cyclic face, which belong to the {beside} blade, but not their partners on the {leads} face",
+            f"Take the partners on the {leads} face into the set, or leave the face out.",
         )
     return left
 

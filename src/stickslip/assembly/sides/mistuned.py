@@ -41,6 +41,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Dofs, Structure
+from stickslip.reduction.contact_coordinates import gaps_by_sector
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import MistunedWheel, circulant, couplings, mistuned_wheel, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
@@ -236,8 +237,9 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     for k in range(model.sectors):
         loads = waves.waves[k][1]
         shares = loads[:, 1:].conj().T if loads.ndim > 1 else np.zeros((0, loads.size))
-        back = np.conj(wave(k, model.sectors).phase)
-        seen.append(_with_behind(changes, shares, back) @ sector.ways[k])
+        phase = wave(k, model.sectors).phase
+        beside = np.conj(phase) if waves.sector.ahead > 0 else phase
+        seen.append(_with_behind(changes, shares, beside) @ sector.ways[k])
     few = [change.factors is not None for change in changes]
     counts = [change.rows.shape[0] for change in changes]
     factors = [c.factors for c in changes if c.factors is not None]
@@ -263,17 +265,17 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     return AllSectors(model, sector, structure, gaps, fluid)
 
 
-def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | float) -> Matrix:
-    """Return the shares of a sector's deviations in a wave, with the motion of the previous sector times `back`."""
+def _with_behind(changes: Sequence[Deviation], shares: Matrix, beside: complex | float) -> Matrix:
+    """Return the shares of a sector's deviations in a wave, with the motion of the sector that follows it times `beside`."""
     first = np.cumsum([0, *(c.rows.shape[0] for c in changes)])
     found, next_one = shares[: first[-1]], int(first[-1])
     if next_one == shares.shape[0]:
         return found
-    found = found.astype(np.result_type(shares, type(back)))
+    found = found.astype(np.result_type(shares, type(beside)))
     for start, change in zip(first, changes, strict=False):
         if change.behind is not None:
             count = change.rows.shape[0]
-            found[start : start + count] += back * shares[next_one : next_one + count]
+            found[start : start + count] += beside * shares[next_one : next_one + count]
             next_one += count
     return found
 
@@ -300,18 +302,13 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
 def _shifted_gaps(waves: SectorWaves, pairs: Pairs, size: int) -> Matrix:
     """Return the gaps of all sectors from their coordinates.
 
-    Each contact acts on this sector, the next one and the one after it.
+    Each contact acts on three sectors: this one, the next one, and the one after it or the previous one.
     """
     sector = waves.sector
     place = np.searchsorted(sector.independent, waves.kept)
-    tie = sector.tie[:, : sector.independent.size][:, place]
-    high = np.zeros(sector.structure.n)
-    high[sector.high] = 1.0
-    tied, free = (scipy.sparse.diags_array(d) @ tie for d in (high, 1.0 - high))
     wide = picked(np.arange(place.size), size)
-    own, following = pairs.own, pairs.following
-    known = [own @ free, own @ tied + following @ free, following @ tied]
-    return repeated([m @ wide for m in known], sector.sectors)
+    known, ahead = gaps_by_sector(sector, place, (pairs.own, pairs.following))
+    return repeated([m @ wide for m in known], sector.sectors, ahead.tolist())
 
 
 def names_of_all(model: Model) -> tuple[str, ...]:

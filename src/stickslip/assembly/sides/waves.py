@@ -161,7 +161,7 @@ def sector_waves(
     if rows is not None:
         columns = scipy.sparse.csr_array(at.columns(rows).T)
         loads = scipy.sparse.hstack([scipy.sparse.csr_array(loads[:, None]), columns], format="csr")
-    wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights)
+    wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights, sector.ahead)
     like = () if reduction is None else spin.references
     own = _content_of(model, like, wheel[1:], kept)
     content = content_hash("wave", *wheel, kept, damping, loads, own)
@@ -299,8 +299,10 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts
     damping = damping_by_modes(bodies, reduced=bool(ways))
     if not ways:
         return None, damping, empty
-    high = empty if model.neighbours is None else model.neighbours.high
-    whole = [np.setdiff1d(model.places.own(name), high) for name, part in model.parts.items() if part.reduction is None]
+    follow = empty if model.neighbours is None else model.neighbours.followers
+    whole = [
+        np.setdiff1d(model.places.own(name), follow) for name, part in model.parts.items() if part.reduction is None
+    ]
     return _one_of(ways), damping, np.concatenate([empty, *whole])
 
 

@@ -74,9 +74,11 @@ class Neighbours:
     turn
         Number of sectors and axis.
     low, high
-        Dofs of all parts on the low and high faces; `high` follows `low`.
+        Dofs of all parts on the low and high faces.
     weights
-        (high, low) CSR as in `CyclicSector`; None: dofs in the same position are partners.
+        CSR as in `CyclicSector`; None: dofs in the same position are partners.
+    ahead
+        As in `CyclicSector`: 1: `high` follows `low` of the next sector; −1: `low` follows `high` of the previous one.
     ties
         Part -> tie of its static displacement, which is the same in all sectors.
     warnings
@@ -87,8 +89,19 @@ class Neighbours:
     low: IntArray
     high: IntArray
     weights: Matrix | None
+    ahead: int
     ties: Mapping[str, Matrix]
     warnings: tuple[str, ...]
+
+    @property
+    def followers(self) -> IntArray:
+        """Dofs of the face that follows."""
+        return self.high if self.ahead > 0 else self.low
+
+    @property
+    def leaders(self) -> IntArray:
+        """Dofs of the face that leads."""
+        return self.low if self.ahead > 0 else self.high
 
     def sector(self, structure: Structure, at: Coordinates) -> CyclicSector:
         """Return the cyclic sector of a structure.
@@ -104,21 +117,25 @@ class Neighbours:
             here, torn = low >= 0, np.flatnonzero((low < 0) != (high < 0))
             low, high = low[here], high[here]
         else:
-            followed, follow = low >= 0, high >= 0
-            across = (weights[follow][:, ~followed], weights[~follow][:, followed])
+            here, there = low >= 0, high >= 0
+            follow, lead = (there, here) if self.ahead > 0 else (here, there)
+            across = (weights[follow][:, ~lead], weights[~follow][:, lead])
             torn = np.concatenate([np.unique(part.nonzero()[0]) for part in across])
-            low, high, weights = low[followed], high[follow], weights[follow][:, followed]
+            low, high, weights = low[here], high[there], weights[follow][:, lead]
         if torn.size:
             raise input_error(
                 "join",
                 f"{torn.size} dofs of a cyclic face follow a join, and their partners on the other face do not",
                 "Join both faces alike.",
             )
-        return CyclicSector(structure, self.turn.sectors, low, high, self.turn.axis, weights)
+        return CyclicSector(structure, self.turn.sectors, low, high, self.turn.axis, weights, self.ahead)
 
 
-def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
+def neighbours(places: Places, parts: Mapping[str, Part], *, joined: bool = False) -> Neighbours | None:
     """Pair the cyclic faces of all parts; None if the model is not a sector.
+
+    The high faces follow. The low faces follow instead if all of them have meshes that do not match and are the finer ones, and
+    no surface is `joined` to the next sector.
 
     Raises
     ------
@@ -129,10 +146,13 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
     if not counts:
         return None
     _refuse_others(parts, counts)
+    found = {name: faces_of(name, parts[name], 1 if joined else None) for name in counts}
+    ahead = -1 if all(one is None or one.ahead < 0 for one in found.values()) and any(found.values()) else 1
+    for name, one in found.items():
+        if one is not None and one.ahead != ahead:
+            found[name] = faces_of(name, parts[name], ahead)
     tied, ties, warnings, axes = [], {}, [], []
-    for name in counts:
-        part = parts[name]
-        sector = faces_of(name, part)
+    for name, sector in found.items():
         if sector is None:
             why = "has no cyclic faces; only contacts and joins lead to its neighbours."
             warnings.append(f"part.{name}: {why}")
@@ -140,18 +160,21 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
         ties[name] = sector.tie
         axes.append(sector.axis)
         first = places.offset(name)
-        tied.append((sector.low + first, sector.high + first, sector.weights))
+        tied.append((sector.leaders + first, sector.followers + first, sector.weights))
     axis = axes[0] if axes else parts[next(iter(counts))].axis
     if any((a is None) != (axis is None) or (a is not None and a != axis) for a in axes):
         raise input_error("part", "turn about different axes", "Give all parts of a wheel one axis.")
     turn = Turn(next(iter(counts.values())), axis)
-    return Neighbours(turn, *_one_after_the_other(tied), ties, tuple(warnings))
+    leaders, followers, weights = _one_after_the_other(tied)
+    low, high = (leaders, followers) if ahead > 0 else (followers, leaders)
+    return Neighbours(turn, low, high, weights, ahead, ties, tuple(warnings))
 
 
 def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
     """Return the cyclic faces together with the ties of joins to the next sector."""
     if found is None or not ties.high.size:
         return found
+    assert found.ahead > 0
     both = (found.low, found.high, found.weights), (ties.low, ties.high, ties.onward)
     low, high, weights = _one_after_the_other(both)
     first = np.sort(np.unique(high, return_index=True)[1])  # corners at which faces meet
@@ -163,7 +186,7 @@ def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
 def _one_after_the_other(
     tied: Sequence[tuple[IntArray, IntArray, Matrix | None]],
 ) -> tuple[IntArray, IntArray, Matrix | None]:
-    """Concatenate tied dofs; with weights, each dof of the low faces occurs once."""
+    """Concatenate tied dofs, leading and following; with weights, each leading dof occurs once."""
     low, high = stacked(one[0] for one in tied), stacked(one[1] for one in tied)
     if all(one[2] is None for one in tied):
         return low, high, None
@@ -193,15 +216,18 @@ def _refuse_others(parts: Mapping[str, Part], counts: Mapping[str, int]) -> None
             )
 
 
-def faces_of(name: str, part: Part) -> CyclicSector | None:
-    """Return the cyclic sector of a part; None without cyclic faces."""
+def faces_of(name: str, part: Part, ahead: int | None = None) -> CyclicSector | None:
+    """Return the cyclic sector of a part; None without cyclic faces.
+
+    `ahead` says which face follows where meshes do not match, as in `CyclicSector`; None: the finer one.
+    """
     here = [face in part.structure.sets for face in part.faces]
     if not any(here) and part.faces == Part.faces:
         return None
     try:
         low, high = (part.structure.dof_set(face) for face in part.faces)
         if part.cyclic == MEAN:
-            return unlike_faces(part)
+            return unlike_faces(part, ahead)
         if part.mesh is None and not _in_space(part.structure, low):
             return CyclicSector(part.structure, part.sectors, low, high, axis=None)
         return cyclic_sector(part.structure, part.sectors, low=part.faces[0], high=part.faces[1], axis=part.axis)
@@ -215,34 +241,34 @@ def _in_space(structure: Structure, members: IntArray) -> bool:
 
 
 def partners(sector: CyclicSector) -> IntArray:
-    """Return all dofs of a sector, with dofs of the high face replaced by their partners on the low face.
+    """Return all dofs of a sector, with dofs of the face that follows replaced by their partners on the other.
 
     -1 for several partners.
     """
     place = np.arange(sector.structure.n)
-    high, low, weights = sector.following
-    place[high] = -1
+    follow, lead, weights = sector.following
+    place[follow] = -1
     single = np.flatnonzero(np.diff(weights.indptr) == 1)
-    place[high[single]] = low[weights.indices[weights.indptr[single]]]
+    place[follow[single]] = lead[weights.indices[weights.indptr[single]]]
     return place
 
 
 def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
     """Return the independent dofs for `dofs` of a sector, in ascending order.
 
-    They are the dofs themselves, or their partners on the low face.
+    They are the dofs themselves, or their partners on the face that leads.
     """
-    high, low, weights = sector.following
-    followed = weights[np.isin(high, dofs)].nonzero()[1]
-    return np.union1d(np.setdiff1d(dofs, high), low[followed])
+    follow, lead, weights = sector.following
+    followed = weights[np.isin(follow, dofs)].nonzero()[1]
+    return np.union1d(np.setdiff1d(dofs, follow), lead[followed])
 
 
 def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix]:
-    """Return (n, b) matrices from independent dofs to the motion in their own sector, and in the previous one."""
+    """Return (n, b) matrices from independent dofs to the motion in their own sector, and in the neighbour that follows them."""
     tie = sector.tie[:, np.searchsorted(sector.independent, dofs)]
-    high = np.zeros(sector.structure.n)
-    high[sector.high] = 1.0
-    own, onward = (scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - high, high))
+    follows = np.zeros(sector.structure.n)
+    follows[sector.followers] = 1.0
+    own, onward = (scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - follows, follows))
     onward.eliminate_zeros()
     return own, onward
 
@@ -315,10 +341,11 @@ class ReducedSector:
         here = partners(self.sector)[dofs]
         behind = dofs[here != dofs]
         if behind.size and (place == "output.points" or np.any(here < 0)):
+            face, other = ("high", "low") if self.sector.ahead > 0 else ("low", "high")
             raise input_error(
                 place,
-                f"{self.sector.structure.dofs.labels[int(behind[0])]} lies on the high cyclic face, which moves as the neighbour's low face",
-                "Take its partner on the low face, or a place beside the faces.",
+                f"{self.sector.structure.dofs.labels[int(behind[0])]} lies on the {face} cyclic face, which moves as the neighbour's {other} face",
+                f"Take its partner on the {other} face, or a place beside the faces.",
             )
         rows = self.ways[0][np.searchsorted(self.kept, here)]
         single = np.diff(rows.indptr) == 1

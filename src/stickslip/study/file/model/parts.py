@@ -237,7 +237,7 @@ class FileModel(PartTable):
     high_face: Name | None = Field(None, description="name of the node set of the cyclic face at the higher angle")
     cyclic: Literal["node_to_node", "segment_to_segment", "none"] = Field(
         "node_to_node",
-        description="how the cyclic faces are tied. node_to_node: meshes match; segment_to_segment: meshes do not match, and the high face follows the low one in the mean; none: the part has no such faces, and only contacts and joins connect it to its neighbours, as a damper between blades",
+        description="how the cyclic faces are tied. node_to_node: meshes match; segment_to_segment: meshes do not match, and the finer face follows the other one in the mean; none: the part has no such faces, and only contacts and joins connect it to its neighbours, as a damper between blades",
     )
     clamped: list[Name] = Field(
         default_factory=list,
