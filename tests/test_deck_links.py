@@ -1,5 +1,7 @@
 """Equations, rigid bodies, turned supports, point masses, springs and dashpots of decks: closed forms, identities, refusals."""
 
+import re
+
 import numpy as np
 import pytest
 import scipy
@@ -194,6 +196,14 @@ def test_a_point_mass_on_a_spring(tmp_path):
     np.testing.assert_allclose(found[0], np.sqrt(8000.0 / 2.0) / (2 * np.pi), rtol=1e-9)
 
 
+def test_negative_springs_and_dashpots_are_told(tmp_path):
+    text = bricks(1) + STEEL + ROOT + "*ELEMENT, TYPE=SPRING1, ELSET=SP\n91, 5\n*SPRING, ELSET=SP\n3\n-8000.\n"
+    text += "*ELEMENT, TYPE=DASHPOTA, ELSET=D\n92, 5, 6\n*DASHPOT, ELSET=D\n\n-3.\n"
+    spring, dashpot = read(tmp_path, text).told
+    assert re.fullmatch(r"the stiffness -8000 is negative \(.*: line \d+\): it pushes away from rest", spring)
+    assert re.fullmatch(r"the damping -3 is negative \(.*: line \d+\): it feeds vibration", dashpot)
+
+
 def test_supports_in_turned_axes(tmp_path):
     """A bar and its supports, turned together, have the frequencies of the bar with supports along x, y, z."""
     turn = scipy.spatial.transform.Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
@@ -383,6 +393,11 @@ def test_a_gap_within_the_tolerance_is_closed(tmp_path):
     assert set(kept.mesh.points[:, 0].round(12)) == {0.0, 0.1, 0.101, 0.201}
     with pytest.raises(InputError, match=r"no node of 'L100' lies within 0\.0005 of 'H0'\. Correct the surfaces"):
         read(tmp_path, tied("L100", "H0", ", POSITION TOLERANCE=0.0005", gap=0.001))
+
+
+def test_a_negative_tolerance_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"line \d+, \*TIE: the POSITION TOLERANCE -0\.002 is negative"):
+        read(tmp_path, tied("L100", "H0", ", POSITION TOLERANCE=-0.002", gap=0.001))
 
 
 def test_nodes_beyond_the_tolerance_are_told(tmp_path):

@@ -45,7 +45,10 @@ def test_a_study_of_matrices_of_beams(tmp_path):
 
 def test_dofs_named_twice_are_refused_of_solids(tmp_path):
     stem = copied(tmp_path, "beam", lambda text: text.replace("TYPE=B32", "TYPE=C3D20"))
-    with pytest.raises(InputError, match=r"beam\.dof: names a dof twice.*the deck that CalculiX ran, too"):
+    with pytest.raises(
+        InputError,
+        match=r"beam\.dof: line 4: names a dof twice, direction 2 of node 1\..*the deck that CalculiX ran, too",
+    ):
         read_calculix_matrices(stem, units=Units.mm_t_s())
 
 

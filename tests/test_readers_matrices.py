@@ -463,6 +463,11 @@ def test_unsymmetric_matrices_are_told(tmp_path):
         ("job.xyz", r"no reader for files '\.xyz'.*\.inp"),
         ("job", "a file without suffix"),
         ("job.op4", "read_nastran_op4"),
+        (
+            "wing.bdf",
+            r"wing\.bdf: line 3: CHEXA: a model of Nastran's bulk data is not read, this one of CHEXA, CONM2, RBE2",
+        ),
+        ("dmig.bdf", "read_nastran_dmig"),
         ("job.inp", "no such file"),
         ("K.mtx", r"is one matrix, not a whole model. Give mass="),
         ("A_STIF1.mtx", r"is one matrix, not a whole model. Give mass="),
@@ -472,6 +477,9 @@ def test_unsymmetric_matrices_are_told(tmp_path):
 def test_what_cannot_be_opened_is_asked_for(tmp_path, name, message):
     two_by_two(tmp_path)
     (tmp_path / "A_STIF1.mtx").write_text(STIFF)
+    bulk = "BEGIN BULK\nGRID,1,,0.,0.,0.\nCHEXA,1,1,1,2,3,4,5,6\n,7,8\nCONM2*  50\nRBE2,60,9,123456,5\nENDDATA\n"
+    (tmp_path / "wing.bdf").write_text(bulk)
+    (tmp_path / "dmig.bdf").write_text("BEGIN BULK\nGRID,1,,0.,0.,0.\nDMIG,K2GG,0,6,1,0\nENDDATA\n")
     np.savez(tmp_path / "K.npz", np.eye(3))
     with pytest.raises(InputError, match=message):
         read_model(tmp_path / name)

@@ -132,6 +132,10 @@ def test_materials_that_are_no_material_are_refused(folder, material, message):
         ("euler_deg = [1, 2, 3]\ntilt_deg = 5.0", "tilt_deg: goes together with stacking_axis"),
         ("euler_deg = [1, 2, 3]\naround_origin_m = [0, 0, 1]", "around_origin_m: goes together with around"),
         ('stacking_axis = "x"\nreference = "z"\ntilt_deg = 91.0', "tilt_deg"),
+        (
+            'stacking_axis = "x"\nreference = "z"\nsecondary_deg = 45\ntilt_deg = 55.0',
+            r"tilt_deg: is 55, and axis 1 of the crystal lies nearer the stacking axis, at 54\.6°.*at most 54\.74",
+        ),
     ],
 )
 def test_axes_that_are_no_axes_are_refused(folder, orientation, message):
@@ -318,6 +322,15 @@ def test_temperatures_beyond_the_table_and_radii_in_mm_are_doubted(folder):
     assert "far from the radii of its temperature, 20 to 60 m" in said
     (said,) = part_of(folder, STEEL + ROWS, "uniform_c = 1500.0").warnings
     assert said.startswith("part.blade: its temperatures reach 1500 °C, and its constants are those from 20 to ")
+
+
+def test_temperatures_of_nodes_that_the_part_has_not_are_told(folder):
+    numbers = [*part_of(folder, STEEL, "").mesh.numbers, 9001, 9002]
+    (folder / "t.csv").write_text("node,temperature_c\n" + "".join(f"{n},{300 + n % 9}\n" for n in numbers))
+    (said,) = part_of(folder, STEEL + ROWS, 'file = "t.csv"').warnings
+    assert said.startswith(
+        "part.blade: t.csv has temperatures of 2 nodes that the part has not, e.g. 9001, without effect."
+    )
 
 
 def test_a_strain_that_no_metal_has_is_doubted_and_a_node_has_one_temperature(folder):

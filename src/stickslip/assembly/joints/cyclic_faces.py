@@ -111,15 +111,15 @@ def _on_face(mesh: SolidMesh, facets: IntArray, members: IntArray) -> BoolArray:
     """
     _, normal = _facets(mesh.points, facets)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    here = np.isin(facets, members)
-    inside = (here | (facets < 0)).all(axis=1)
+    here = np.asarray(np.isin(facets, members))
+    inside = np.all(here | (facets < 0), axis=1)
     around = np.zeros((len(mesh.points), 3))
     row, column = np.nonzero(here & inside[:, None])
     np.add.at(around, facets[row, column], normal[row])
     mean = np.where(here[:, :, None], around[facets], 0.0).sum(axis=1)
     length = np.linalg.norm(mean, axis=1)
     continues = np.einsum("fc,fc->f", mean, normal) >= SMOOTH * length  # also without such facets: zero
-    return np.asarray(inside | (here.any(axis=1) & continues))
+    return np.asarray(inside | (np.any(here, axis=1) & continues))
 
 
 def _held(structure: Structure, numbers: IntArray) -> BoolArray:

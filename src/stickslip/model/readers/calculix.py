@@ -151,17 +151,19 @@ def _read_dof(path: Path, expanded: bool) -> tuple[IntArray, list[str], IntArray
             )
         own = int(node)
         if (own, copy.setdefault(own, 0), direction) in seen:
+            if not expanded:
+                raise input_error(
+                    f"{path}: line {number}",
+                    f"names a dof twice, direction {direction} of node {own}",
+                    "Give the .dof file of a single run; of beams, shells or plane elements the deck that CalculiX ran, too.",
+                )
             copy[own] += 1
         seen.add((own, copy[own], direction))
         nodes.append(own)
         components.append(COMPONENTS[int(direction) - 1])
         copies.append(copy[own])
-    if not nodes or (any(copies) and not expanded):
-        raise input_error(
-            str(path),
-            "names a dof twice, or none",
-            "Give the .dof file of a single run; of beams, shells or plane elements the deck that CalculiX ran, too.",
-        )
+    if not nodes:
+        raise input_error(str(path), "names no dof", "Give the .dof file of CalculiX.")
     return np.array(nodes, dtype=np.int64), components, np.array(copies, dtype=np.int64)
 
 

@@ -79,8 +79,7 @@ def tie_faces(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) ->
         low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
         model.ties.append((low, high))
         if block.parameters.get("POSITION TOLERANCE"):
-            reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
-            model.reach = max(model.reach, reach)
+            model.reach = max(model.reach, _tolerance(block))
         if model.sectors is None:
             raise input_error(
                 block.place,
@@ -113,6 +112,16 @@ def couple(model: DeckModel, blocks: list[Block], ignore: tuple[str, ...]) -> No
             )
         surface = _surface_nodes(model, surfaces, name, block.place)
         read(model.links, block, below, partial(nodes_named, model), model.nodes, surface)
+
+
+def _tolerance(block: Block) -> float:
+    """Return the POSITION TOLERANCE of a tie, in the deck's unit of length."""
+    reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
+    if reach < 0:
+        raise input_error(
+            block.place, f"the POSITION TOLERANCE {reach:g} is negative", "Give a distance, or leave it out."
+        )
+    return reach
 
 
 def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
@@ -173,7 +182,7 @@ def _tie(model: DeckModel, block: Block, surfaces: dict[str, Block]) -> None:
         size = float(np.ptp(points[facets[:, :3]], axis=1).max(axis=1).mean())
         reach = TIE_REACH * size
         if block.parameters.get("POSITION TOLERANCE"):
-            reach = real_number(block.parameters["POSITION TOLERANCE"], block.place, "POSITION TOLERANCE")
+            reach = _tolerance(block)
         rows = model.nodes.index(slave)
         facet, reference, distance = _nearest(points, facets, rows, reach)
         met = np.flatnonzero(distance <= reach)
@@ -453,7 +462,7 @@ def read_deck(path: Path | str, *, units: Units = SI, ignore: tuple[str, ...] = 
         tuple(name for name, nodes in free_sets.items() if not nodes.size),
         model.of_abaqus,
         links,
-        () if links is None else _of_equations(links, held),
+        () if links is None else (*model.links.negative, *_of_equations(links, held)),
         heat,
     )
 
@@ -626,10 +635,8 @@ def _met(mesh: SolidMesh, faces: tuple[IntArray, IntArray], axis: Axis, pitch: f
     if not (low.size and high.size):
         return mesh
     away, partner = cKDTree(mesh.points[high]).query(axis.turned(mesh.points[low], pitch))
-    size = float(np.ptp(mesh.points[high], axis=0).max())
-    moved = (
-        (away > 0) & (away <= min(reach, PAIRED * size)) & (np.linalg.norm(axis.arm(mesh.points[low]), axis=1) > reach)
-    )
+    reach = min(reach, PAIRED * float(np.ptp(mesh.points[high], axis=0).max()))
+    moved = (away > 0) & (away <= reach) & (np.linalg.norm(axis.arm(mesh.points[low]), axis=1) > reach)
     moved &= ~np.isin(low, high)
     if not moved.any() or np.unique(partner[moved]).size < np.count_nonzero(moved):
         return mesh

@@ -41,6 +41,8 @@ class DeckLinks:
         Numbers of those whose mass, stiffness or damping was read.
     masses
         Node and mass of each point mass.
+    negative
+        A sentence for each negative stiffness or damping.
     springs, dashpots
         Terms of an elongation, and its stiffness or damping.
     rotation_nodes
@@ -58,6 +60,7 @@ class DeckLinks:
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     valued: set[int] = field(default_factory=set)
     masses: list[tuple[int, float]] = field(default_factory=list)
+    negative: list[str] = field(default_factory=list)
     springs: list[tuple[Vector, float]] = field(default_factory=list)
     dashpots: list[tuple[Vector, float]] = field(default_factory=list)
     rotation_nodes: dict[int, int] = field(default_factory=dict)
@@ -383,9 +386,7 @@ def read_point_property(links: DeckLinks, block: Block, elements: IntArray, tabl
             "Values by temperature or frequency are not read.",
         )
     place, fields = rows[-1]
-    value = real_number(fields[0], place, "value")
-    if family == "MASS" and value < 0:
-        raise input_error(place, f"the mass {value:g}", "A point mass is zero or greater.")
+    value = _point_value(links, family, fields[0], place)
     along = [whole_number(text, rows[0][0], "direction") for text in rows[0][1] if text] if directions else []
     if directions and (len(along) != directions[0] or not all(1 <= d <= 3 for d in along)):
         raise input_error(rows[0][0], f"gives the directions {along}", f"{kind} needs {directions[0]}, from 1 to 3.")
@@ -410,6 +411,17 @@ def read_point_property(links: DeckLinks, block: Block, elements: IntArray, tabl
             target.append((_elongation(nodes, along, table, block.place), value))
     if family == "SPRING":
         links.linear(block.place, "a spring")
+
+
+def _point_value(links: DeckLinks, family: str, text: str, place: str) -> float:
+    """Return a mass, stiffness or damping; a negative mass is refused, the others are noted."""
+    value = real_number(text, place, "value")
+    if value < 0 and family == "MASS":
+        raise input_error(place, f"the mass {value:g}", "A point mass is zero or greater.")
+    if value < 0:
+        what, does = ("stiffness", "pushes away from rest") if family == "SPRING" else ("damping", "feeds vibration")
+        links.negative.append(f"the {what} {value:g} is negative ({place}): it {does}")
+    return value
 
 
 def _elongation(nodes: list[int], along: list[int], table: NodeTable, place: str) -> Vector:

@@ -218,6 +218,24 @@ CONSTRAINTS = {
     "SPCOFF",
     "SPCOFF1",
 }
+SUPPORTS = {"SPC", "SPC1", "SPCADD", "SPCOFF", "SPCOFF1"}
+ELEMENTS = {
+    *("CHEXA", "CPENTA", "CPYRAM", "CPYRA", "CTETRA", "CBAR", "CBEAM", "CROD", "CQUAD4", "CQUAD8", "CTRIA3", "CTRIA6"),
+    *(
+        "CELAS1",
+        "CELAS2",
+        "CBUSH",
+        "CDAMP1",
+        "CDAMP2",
+        "CVISC",
+        "CSHEAR",
+        "CQUADR",
+        "CTRIAR",
+        "CBEND",
+        "CONROD",
+        "CTUBE",
+    ),
+}
 RECTANGULAR, CYLINDRICAL, SPHERICAL = 1, 2, 3
 
 
@@ -710,3 +728,26 @@ def _key(point: str, component: str, place: str) -> int:
     if number > 6:
         raise refused(component, "component 0 to 6", place)
     return 10 * whole(point, place) + number
+
+
+def refuse_bulk_model(path: Path) -> None:
+    """Refuse bulk data with elements, which are not read; a file without cards of elements, masses or rigid elements passes.
+
+    Raises
+    ------
+    InputError
+        If there is such a card; the message names the line of the first one.
+    """
+    kinds: dict[str, int] = {}
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        name = line.split("$")[0][:8].split(",")[0].strip().rstrip("*").upper()
+        if name in CONSTRAINTS - SUPPORTS or name.startswith("CONM") or name in ELEMENTS:
+            kinds.setdefault(name, number)
+    if kinds:
+        first = min(kinds, key=lambda name: kinds[name])
+        raise input_error(
+            f"{path}: line {kinds[first]}",
+            f"{first}: a model of Nastran's bulk data is not read, this one of {', '.join(sorted(kinds))}",
+            "Have Nastran write its matrices, which contain masses and rigid elements (DMIG or .op4, the page Nastran), or write the mesh as "
+            "a deck of CalculiX or Abaqus.",
+        )

@@ -23,6 +23,7 @@ from stickslip.model.readers.entries import SYMMETRY, asymmetry
 from stickslip.model.readers.frd import FrdResults, read_frd
 from stickslip.model.readers.matrix_files import names_in, read_matrix_files, refuse_other_names
 from stickslip.model.readers.nastran import NastranResults, read_nastran_op2
+from stickslip.model.readers.nastran_bulk import refuse_bulk_model
 from stickslip.model.readers.positions import doubt_about_positions
 from stickslip.model.readers.text import read_text
 from stickslip.model.readers.units import ARGUMENTS, SI, Units, doubt_about_units, translational_mass
@@ -338,6 +339,8 @@ def read_model(
     suffixes = [s.lower() for s in path.suffixes]
     suffix = suffixes[-2] if suffixes[-1:] == [".gz"] and suffixes[:-1] else "".join(suffixes[-1:])
     if suffix not in _READERS:
+        if suffix in (".bdf", ".nas", ".dat") and path.is_file():
+            refuse_bulk_model(path)
         raise input_error(
             str(path),
             f"no reader for files {suffix!r}" if suffix else "a file without suffix",

@@ -373,9 +373,10 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     given, home, of_deck = heat
-    temperature = temperature_of(key, given, free, material, axis, home=home, of_deck=of_deck)
+    notes: list[str] = []
+    temperature = temperature_of(key, given, free, material, axis, home=home, of_deck=of_deck, say=notes.append)
     doubts = doubts_of_temperature(key, given, free, material, axis, temperature or of_deck)
-    others["warnings"] = (*others.get("warnings", ()), *doubts)
+    others["warnings"] = (*others.get("warnings", ()), *notes, *doubts)
     return solid_part(
         free,
         material,

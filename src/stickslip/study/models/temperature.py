@@ -9,6 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.cell_laws import Temperature
+from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.fe.material import ElasticMaterial, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.frd import read_frd
@@ -30,6 +31,7 @@ def temperature_of(
     *,
     home: Path,
     of_deck: Temperature | None = None,
+    say: Say = silent,
 ) -> Temperature | None:
     """Return the temperatures of the nodes of a part; None if no material depends on temperature, or none is given.
 
@@ -45,6 +47,8 @@ def temperature_of(
         Folder to which file names are relative.
     of_deck
         Temperatures of the part's deck; None without any.
+    say
+        Called with a sentence about a file that has other nodes, too.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def temperature_of(
         start[:] = table.stress_free_c
     elif of_deck is not None:
         start = of_deck.start
-    hot = _field(place, table, mesh, axis, home, of_deck)
+    hot = _field(place, table, mesh, axis, home, of_deck, say)
     return Temperature(start + table.factor * (hot - start), start)
 
 
@@ -136,7 +140,13 @@ def doubts_of_temperature(
 
 
 def _field(
-    place: str, table: TemperatureTable, mesh: SolidMesh, axis: Axis, home: Path, of_deck: Temperature | None
+    place: str,
+    table: TemperatureTable,
+    mesh: SolidMesh,
+    axis: Axis,
+    home: Path,
+    of_deck: Temperature | None,
+    say: Say,
 ) -> FloatArray:
     if table.uniform_c is not None:
         return np.full(len(mesh.points), table.uniform_c)
@@ -144,7 +154,7 @@ def _field(
         radius = np.linalg.norm(axis.arm(mesh.points), axis=1)
         return np.asarray(np.interp(radius, table.radius_m, table.at_radius_c))
     if isinstance(table, FileTemperature) and table.file is not None:
-        return _by_node(home / table.file, mesh)
+        return _by_node(place, home / table.file, mesh, say)
     if of_deck is None:
         raise input_error(
             f"{place}.temperature",
@@ -154,7 +164,7 @@ def _field(
     return of_deck.values
 
 
-def _by_node(path: Path, mesh: SolidMesh) -> FloatArray:
+def _by_node(place: str, path: Path, mesh: SolidMesh, say: Say) -> FloatArray:
     """Read temperatures of the nodes that belong to cells."""
     numbers: FloatArray
     values: FloatArray
@@ -185,5 +195,11 @@ def _by_node(path: Path, mesh: SolidMesh) -> FloatArray:
             str(path),
             f"lacks the temperature of {missing.size} nodes, e.g. {mesh.numbers[missing[0]]}",
             "Give every node of the part.",
+        )
+    other = numbers[~np.isin(numbers, mesh.numbers)]
+    if other.size:
+        say(
+            f"{place}: {path.name} has temperatures of {other.size} nodes that the part has not, e.g. {other[0]:.0f}, without effect. "
+            "Check that its numbers are those of this mesh."
         )
     return np.asarray(found)

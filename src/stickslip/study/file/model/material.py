@@ -33,6 +33,8 @@ from stickslip.study.file.section import FilePath, Positive, Section, custom_err
 from stickslip.study.own_code import is_address
 from stickslip.units import DEG
 
+ANGLE_ROUNDING = 1e-6  # degrees
+
 FEW = 25  # default number of fixed-interface modes
 OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
 MODES_OF = tuple(OWN_MODES.values())
@@ -68,7 +70,8 @@ class OrientationTable(Section):
         description="of a casting: direction, across the stacking axis, from which azimuth and secondary angle are counted",
     )
     tilt_deg: Annotated[float, Field(ge=0, le=90)] = Field(
-        0.0, description="of a casting: angle between axis 3 and the stacking axis in degrees, 0 to 90"
+        0.0,
+        description="of a casting: angle between axis 3 and the stacking axis in degrees, 0 to 90; of a cubic crystal at most 54.74, where another ⟨001⟩ becomes the nearest",
     )
     azimuth_deg: Angle = Field(
         0.0,
@@ -279,6 +282,7 @@ class _PlausibleMaterial(Section):
                 "Give shear_modulus_pa (a cubic crystal), nine constants or elasticity_pa, or leave it out.",
                 "orientation",
             )
+        yield from self._problems_of_casting("shear_modulus_pa" in given | frozenset().union(*kinds))
         if len(set(kinds)) > 1:
             yield custom_error("has rows of different keys", "Give all rows the same constants.", "over_temperature")
         for key in kinds[0] & given if kinds else ():
@@ -294,6 +298,20 @@ class _PlausibleMaterial(Section):
                 "over_temperature",
             )
         yield from self._problems_of_expansion(rows)
+
+    def _problems_of_casting(self, cubic: bool) -> Iterator[PydanticCustomError]:
+        """Yield what is wrong with the tilt of a cubic crystal: its axis 3 is the ⟨001⟩ nearest the stacking axis."""
+        table: OrientationTable | None = getattr(self, "orientation", None)
+        if not cubic or table is None or table.stacking_axis is None:
+            return
+        up = np.array(table.stacking_axis) / np.linalg.norm(table.stacking_axis)
+        apart = np.degrees(np.arccos(np.minimum(np.abs(up @ np.array(table.library().axes)), 1.0)))
+        if apart.min() < apart[2] - ANGLE_ROUNDING:
+            yield custom_error(
+                f"is {table.tilt_deg:g}, and axis {int(apart.argmin()) + 1} of the crystal lies nearer the stacking axis, at {apart.min():.4g}°",
+                "Give the tilt of the nearest ⟨001⟩, at most 54.74, with its azimuth and secondary angle.",
+                "orientation.tilt_deg",
+            )
 
     def _problems_of_expansion(self, rows: list[Any]) -> Iterator[PydanticCustomError]:
         table: Any = self
