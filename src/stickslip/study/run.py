@@ -377,8 +377,11 @@ def _tasks(
     """Return a task for every case of every analysis of the study; only requested analyses get the checks."""
     found = []
     for own in asked_for(study):
-        wanted = checks & frozenset(own.checks) if own in asked else frozenset()
-        found += [_task(own, replace(c, checks=wanted | own.asks(c)), study.folder, versions) for c in cases]
+        wanted = checks & frozenset(own.checks)
+        found += [
+            _task(own, replace(c, checks=wanted | own.asks(c) if own in asked else frozenset()), study.folder, versions)
+            for c in cases
+        ]
     return found
 
 

@@ -25,7 +25,7 @@ from stickslip.analyses.forced_response.physics.limits import (
     physics_of,
     statics_of_dampers,
 )
-from stickslip.analyses.forced_response.problem import STILL_HZ, Question, question_of
+from stickslip.analyses.forced_response.problem import STILL_HZ, Question, question_of, strength_of
 from stickslip.analyses.forced_response.shooting import shooting_lines
 from stickslip.analyses.forced_response.stability.bifurcating import bifurcations_line
 from stickslip.analyses.forced_response.stability.stable import cost_lines
@@ -74,12 +74,18 @@ def advice(case: Case, model: Model) -> Advice:
         *(v for v in known if v.rank),
         *_not_swept(question, *of_frequencies(asked_of(case), model.engine_order)),
     ]
+    idle = strength_of(case).idle
     cost = estimate(model, question.sweep) if question.stepping is None else None
     if cost is not None and physics is not None:
         cost = replace(cost, slips=physics.slip_ratio)
     return Advice(
         computed=_computed(case, model, question, cost),
-        doubts=(*doubted, *(f"{v.why}. {v.remedy}" for v in doubts), *units_in_doubt(question, model)),
+        doubts=(
+            *doubted,
+            *(f"{v.why}. {v.remedy}" for v in doubts),
+            *units_in_doubt(question, model),
+            *[f"{idle}. Remove what is not used, or choose the rule that uses it."] * bool(idle),
+        ),
         at_rest=(*contacts_at_rest(question), *damper_lines(statics)),
         beside=(
             *beside_the_range(question),

@@ -373,13 +373,14 @@ def _refuse_stress(case: Case, model: Model) -> None:
         )
     for name in table.card:
         if name not in solids:
-            raise input_error(
-                f"stress.card.{name}",
-                "is no part with elements and a material",
-                did_you_mean(name, list(solids)),
-            )
+            raise no_solid(name, list(solids))
     for name, solid in solids.items():
         card_of(table, name, np.array([np.nan]) if solid.temperature is None else solid.temperature.values)
+
+
+def no_solid(name: str, solids: list[str]) -> InputError:
+    """Return the refusal of limits of a part that has no stress."""
+    return input_error(f"stress.card.{name}", "is no part with elements and a material", did_you_mean(name, solids))
 
 
 def card_of(table: Stress, part: str, temperature: FloatArray) -> StrengthCard:

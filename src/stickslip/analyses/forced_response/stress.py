@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from stickslip.analyses.forced_response.problem import Question, StressAsked, card_of
+from stickslip.analyses.forced_response.problem import Question, StressAsked, card_of, no_solid
 from stickslip.analyses.forced_response.records.columns import STRESS_AT, SurfaceStress, stored
 from stickslip.analyses.forced_response.records.values import Values, texts
 from stickslip.analyses.forced_response.verdicts.margin import ONE_SIDED
@@ -86,6 +86,14 @@ class PeakStress:
         found = np.zeros((int(self.orders.max(initial=0)) + 1, *self.waves.shape[1:]), dtype=complex)
         found[self.orders] = self.waves
         return found
+
+    @property
+    def digest(self) -> str:
+        """Hash of everything."""
+        found = sha256()
+        for value in vars(self).values():
+            found.update(np.ascontiguousarray(value).tobytes())
+        return found.hexdigest()
 
 
 def of_stress(question: Question, response: Response) -> Values:
@@ -172,8 +180,7 @@ def with_margin(table: Stress, note: Mapping[str, Any], amplitude: float, *, sli
         Whether a contact slips or opens at the peak.
     """
     stress = PeakStress(**note)
-    digest = sha256(stress.waves.tobytes() + stress.distance.tobytes() + stress.temperature.tobytes()).hexdigest()
-    found, scale = _judged(_Judging(table.model_dump_json(), digest, table, stress))
+    found, scale = _judged(_Judging(table.model_dump_json(), stress.digest, table, stress))
     more = SurfaceStress(**found, allowed_amplitude=scale * amplitude, stress_slips=int(slips))
     return stored(more)
 
@@ -221,6 +228,9 @@ def _judged(asked: _Judging) -> tuple[dict[str, Any], float]:
 def _cards(table: Stress, stress: PeakStress) -> list[tuple[IntArray, StrengthCard]]:
     """Return places and card of each part."""
     parts = dict.fromkeys(stress.part.tolist())
+    for name in table.card if parts else ():
+        if name not in parts:
+            raise no_solid(name, list(parts))
     each = [np.flatnonzero(stress.part == name) for name in parts]
     return [(at, card_of(table, name, stress.temperature[at])) for name, at in zip(parts, each, strict=True)]
 
