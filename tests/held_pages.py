@@ -70,20 +70,20 @@ def held(name: str) -> Lines:
 
 def shown(tree: xr.DataTree) -> Lines:
     """Return what the page, the terminal and Python show of a result, in lines."""
-    found = [f"page{line}" for line in _lines("", _given(page, lambda: page.report_html(tree)))]
+    found = [f"page{line}" for line in lines("", _given(page, lambda: page.report_html(tree)))]
     for name in (n for n in ANALYSES if n in tree.children):
         analysis, data = named(name), tree[name].to_dataset()
-        found += [f"{name}.terminal{line}" for line in _lines("", analysis.summary(data))]
-        found += [f"{name}.verdicts{line}" for line in _lines("", analysis.verdicts(data))]
+        found += [f"{name}.terminal{line}" for line in lines("", analysis.summary(data))]
+        found += [f"{name}.verdicts{line}" for line in lines("", analysis.verdicts(data))]
     result = Result(tree)
     frames = {name: result.to_dataframe(name).to_dict("list") for name in result}
-    return [*found, *(f"frames{line}" for line in _lines("", frames))]
+    return [*found, *(f"frames{line}" for line in lines("", frames))]
 
 
 def compared(tree: xr.DataTree, other: xr.DataTree) -> Lines:
     """Return what the page of a comparison shows, in lines."""
     designs = [Design(name, own, k) for k, (name, own) in enumerate((("first", tree), ("second", other)))]
-    return [f"compared{line}" for line in _lines("", _given(side_by_side, lambda: comparison_html(designs)))]
+    return [f"compared{line}" for line in lines("", _given(side_by_side, lambda: comparison_html(designs)))]
 
 
 def stretched(tree: xr.DataTree) -> xr.DataTree:
@@ -108,12 +108,12 @@ def _given(where: ModuleType, make: Callable[[], str]) -> Mapping[str, Any]:
     return given
 
 
-def _lines(place: str, value: Any) -> Iterator[str]:
+def lines(place: str, value: Any) -> Iterator[str]:
     """Yield a line for each text and number inside a value."""
     inside = _inside(value)
     if inside is not None:
         for key, own in inside:
-            yield from _lines(f"{place}{key}", own)
+            yield from lines(f"{place}{key}", own)
     elif isinstance(value, str | bool) and value != "":
         yield f"{place} {value}".replace("\n", "\\n")
     elif isinstance(value, int | float | np.number):
@@ -142,15 +142,18 @@ def _number(value: float) -> str:
 def _numbers(value: Any) -> str | None:
     """Return numbers in short: how many, and three that hang on each of them and on their order; None for what are none."""
     try:
-        every = np.asarray(value, dtype=float).ravel()
+        given = np.asarray(value)
+        if np.iscomplexobj(given):
+            given = np.stack([given.real, given.imag], axis=-1)
+        numbers = np.asarray(given, dtype=float).ravel()
     except (TypeError, ValueError):
         return None
-    if not every.size:
+    if not numbers.size:
         return "none"
-    known = np.nan_to_num(every, nan=0.0, posinf=1e30, neginf=-1e30)
-    weight = 1.0 + np.abs(np.sin(np.arange(1.0, every.size + 1)))
+    known = np.nan_to_num(numbers, nan=0.0, posinf=1e30, neginf=-1e30)
+    weight = 1.0 + np.abs(np.sin(np.arange(1.0, numbers.size + 1)))
     sums = (np.abs(known).max(), np.sum(weight * np.abs(known)), np.sum(weight * (known > 0) * known))
-    return f"{every.size} {int(np.isnan(every).sum())} {' '.join(map(_number, sums))}"
+    return f"{numbers.size} {int(np.isnan(numbers).sum())} {' '.join(map(_number, sums))}"
 
 
 def differences(new: Lines, old: Lines) -> Lines:
