@@ -23,6 +23,7 @@ from stickslip.assembly.fluid.aerodynamics import Aerodynamics
 from stickslip.assembly.fluid.pressure import PressureField
 from stickslip.assembly.forces import Load
 from stickslip.assembly.joints.pairs import refuse_itself
+from stickslip.assembly.sides.deviations import _of_one_blade
 from stickslip.assembly.sides.mistuning import BladeMistuning, ContactMistuning
 from stickslip.contact.laws.bouc_wen import BoucWen
 from stickslip.contact.laws.iwan import FirstLoading, FourParameter, UniformBand
@@ -71,8 +72,10 @@ from stickslip.response.nonlinear_modes.sdof_oscillator import modal_oscillator
 from stickslip.response.residual_tractions.bounds import resonance_bounds, traction_bounds
 from stickslip.response.resonances.first import first_peaks
 from stickslip.response.rotating.campbell import campbell
+from stickslip.response.rotating.envelope import envelope
 from stickslip.response.rotating.safe import safe
 from stickslip.response.time.transient import TimeStepping, check_outputs
+from stickslip.study.file.model.strength import StrengthTable
 from stickslip.study.models.checks import stage_refusals
 from stickslip.study.models.cost import above
 from stickslip.study.models.spares import _own_refusals
@@ -104,6 +107,7 @@ MAP = ss.response.NodalDiameterMap(6, np.arange(4), np.ones((4, 1)), np.ones((4,
 
 
 LINE = go.Figure(go.Scatter(x=[1.0], y=[1.0]))
+RIGID: Any = SimpleNamespace(interface=SimpleNamespace(rigid=(0,)))
 LIMITS: Any = SimpleNamespace(memory_gb=1.0, work_s=10.0)
 
 
@@ -472,6 +476,14 @@ def two_faces(axis: Axis | None) -> CyclicSector:
             "mistuning.m.by: is 'disc', a part of all sectors. Name another [part.NAME]",
         ),
         (
+            lambda: _of_one_blade(of_no_kind(SimpleNamespace(shared=np.array([1]))), np.array([1, 2]), "axis", "m.of"),
+            "m.of: 'axis' has dofs that all sectors share. Leave the axis or the hub out.",
+        ),
+        (
+            lambda: next(envelope(of_no_kind(RIGID), LOAD, of_no_kind(None))),
+            "envelope: needs contact forces that follow from gaps. Give the contacts a stiffness.",
+        ),
+        (
             lambda: write_figure(go.Figure(), "response", Path("a.gif"), "1-column"),
             "figure: a.gif: ends with '.gif'. Give one of .pdf",
         ),
@@ -678,3 +690,16 @@ def test_a_table_of_too_many_lines_is_refused(tmp_path: Path, monkeypatch: pytes
     path.write_text("value,amplitude_m\n1,1\n2,2\n3,3\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"a\.csv: has over 3 lines\. Cut or thin it out\.$"):
         measured_columns.read_columns(path)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([{}, {}], "has temperatures and no limit. Give limits in each row."),
+        ([{"yield_pa": 1e9}, {}], "lacks yield_pa at 30 °C. Give it in each row, or once for all."),
+    ],
+)
+def test_limits_over_temperature_are_refused_with_the_remedy(rows: list[dict[str, float]], said: str) -> None:
+    given = [{"temperature_c": t, **row} for t, row in zip((20.0, 30.0), rows, strict=True)]
+    with pytest.raises(ValueError, match=said.replace(".", r"\.")):
+        StrengthTable.model_validate({"over_temperature": given})
