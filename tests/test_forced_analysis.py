@@ -316,7 +316,7 @@ def test_fold_is_told_with_the_label_of_its_case() -> None:
     assert 0 < int(data.refinement.sum()) <= asked.sweep.peak_points
     (said,) = [t for t in warnings_of(data) if "folds" in t]
     assert said.startswith("The response folds between 0.2")
-    assert "the peak stands among them. Which motion a machine takes" in said
+    assert 'the peak stands among them. Sweep the other way (forced_response.direction = "down"), too' in said
     told = warnings_of(dataset(solved(replace(asked, label="load.f.force_n = 2"))))
     assert any(t.startswith("load.f.force_n = 2: the response folds between") for t in told)
 
@@ -362,7 +362,7 @@ def test_peak_at_the_end_is_no_resonance() -> None:
     said = warnings_of(dataset(solved(lifted(omega_range=(0.6, 0.9), points=5))))
     told = (
         f"The largest amplitude stands at the end of the sweep ({0.9 / HZ:.2f} Hz); it is no resonance. "
-        "Widen forced_response.frequency_hz. Where contacts shift the resonance, a larger motion of its branch may reach into the range: "
+        f"Widen forced_response.frequency_hz to values beyond {0.9 / HZ:.5g} Hz. Where contacts shift the resonance, a larger motion of its branch may reach into the range: "
         "[all_motions] looks for it."
     )
     assert told in said

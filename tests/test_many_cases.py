@@ -222,7 +222,7 @@ def test_the_answer_says_where_friction_does_nothing_and_where_no_case_differs()
     still = data.assign(dissipated_energy=data["dissipated_energy"] * 0, amplitude=data["amplitude"] * 0 + 1e-6)
     told = cards(Response(still))[0]
     assert "Friction dissipates nothing at any peak" in told.note
-    assert "Next: press the contacts less" in told.note
+    assert "Next: raise load.NAME.force_n, or press the contacts less" in told.note
     assert isinstance(energy(Response(still)), Words)  # no empty axes
 
 

@@ -17,8 +17,10 @@ from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.verdicts.curve import Curve
 from stickslip.analyses.forced_response.verdicts.rules import operation
 from stickslip.analyses.operation import InOperation, Met, Operating, answered, ends_of, of_frequencies
+from stickslip.analyses.page import one_a_question
 from stickslip.analyses.waves.verdicts import in_operation, safe_in_operation
 from stickslip.errors import InputError
+from stickslip.report.section import Card
 from stickslip.study.file.model.loads import Operation
 from stickslip.study.models.study import read_study
 from stickslip.study.run import asked_for, not_used
@@ -182,11 +184,21 @@ def test_crossings_are_held_against_the_operating_range() -> None:
     assert found.why.startswith(
         "1 resonance inside the operating speeds, 5000 to 5300 rpm: EO 8 with ND 6 at 5038.3 rpm"
     )
-    assert answered(Operating(5000.0, 5300.0, "rpm"), diagram(0.0, 1.0).met, "resonance") == (
-        "1",
-        "resonance inside the operating speeds, 5000 to 5300 rpm",
-        "EO 8 with ND 6",
-    )
+    (card,) = answered(Operating(5000.0, 5300.0, "rpm"), diagram(0.0, 1.0).met, "resonance")
+    told = (card.value, card.label, card.note)
+    assert told == ("1", "resonance inside the operating speeds, 5000 to 5300 rpm", "EO 8 with ND 6")
+
+
+def test_two_diagrams_answer_one_question_once_by_the_worse_answer() -> None:
+    speeds = Operating(5000.0, 5300.0, "rpm")
+    met = [Met("EO 6 with ND 6", 6, 5920.9), Met("EO 8 with ND 6", 8, 5038.3)]
+    (margin,), (inside,) = answered(speeds, met[:1], "resonance"), answered(speeds, met, "crossing")
+    other = Card("590 Hz", "lowest natural frequency", "")
+    assert one_a_question([margin, other, inside]) == [inside, other]
+    assert one_a_question([inside, other, margin]) == [inside, other]
+    (near,) = answered(Operating(5000.0, 5030.0, "rpm"), met, "crossing")
+    (far,) = answered(Operating(5000.0, 5030.0, "rpm"), met[:1], "resonance")
+    assert one_a_question([far, near]) == [near]
 
 
 def test_a_range_that_no_analysis_uses_is_told(tmp_path: Path) -> None:

@@ -451,7 +451,7 @@ def test_verdicts_are_listed_the_worst_first_with_their_remedies() -> None:
     assert "DOUBTFUL: The damper may drift along y. Hold it." in text
     assert "NOTE: The response folds. Points outside belong to the fold." in text
     assert f"TRUSTED: {KEY} = 5: 171.00 Hz: peak with H = 5, stable." in text
-    assert "Trusted, and what for: 1" in text
+    assert "Trusted, with the checks: 1" in text
 
 
 def test_harmonics_that_were_raised_along_the_branch_are_told_as_such() -> None:
@@ -524,7 +524,12 @@ def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
     assert "1 doubtful point (open symbols), 1 wrong (crosses)" in plot.caption
     assert {"doubtful", "wrong"} <= {t.name for t in plot.figure.data}
     assert "doubtful" in peaks(view).rows[0]
-    assert cards(view)[0].note.endswith("Next: settle why it is doubtful, see above.")
+    assert "Next" not in cards(view)[0].note  # no verdict says what to do
+    remedy = "Lower harmonics.alert_threshold_percent to keep more harmonics; the rest is told below. And more."
+    elsewhere = Verdict("doubtful", view.cases[0].label, 1e3, "too few", "Raise something else.")
+    own = Verdict("doubtful", view.cases[0].label, view.peak_hz(view.cases[0]), "too few", remedy)
+    told = Response(data.assign_attrs(verdicts=to_json([elsewhere, own])))
+    assert cards(told)[0].note.endswith("Next: lower harmonics.alert_threshold_percent to keep more harmonics.")
 
 
 def test_the_table_of_cases_names_the_harmonics_of_the_first_passage() -> None:
@@ -552,9 +557,10 @@ def test_the_answer_is_the_smallest_peak_of_the_best_verdict_and_says_what_to_do
     assert f"mm is doubtful with {order[0].label}." in card.note
     values = sorted(c.value for c in view.cases)
     if order[1].value in (values[0], values[-1]):
-        assert card.note.endswith(f"Next: compute beyond ratio {order[1].value:g}, a smaller one may lie there.")
+        told = f"values beyond {order[1].value:g}, where a smaller peak may lie."
+        assert card.note.endswith(f"Next: give [vary] load.shaker.ratio {told}")
     else:
-        assert card.note.endswith("Next: refine ratio between 5 and 50.")
+        assert card.note.endswith("Next: give [vary] load.shaker.ratio values between 5 and 50.")
 
 
 def test_checks_name_their_case_and_what_decided() -> None:

@@ -585,8 +585,8 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
 
 def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
     for hz, said in (
-        (13.0, "--verify integrates in time at the peak, and"),
-        (11.0, "--verify with forced_response.frequencies_hz = [11.00] alone integrates in time there, and"),
+        (13.0, "Run with --verify, which integrates in time at the peak, and"),
+        (11.0, "Run forced_response.frequencies_hz = [11.00] alone with --verify, which integrates in time there, and"),
     ):
         found = [v for v in judged(response(**examined("undecided", hz)))[0] if v.rank]
         assert said in found[0].remedy
@@ -617,7 +617,7 @@ def test_a_frequency_alone_is_no_end_of_a_sweep() -> None:
 
 def test_remedies_fit_rigid_contacts() -> None:
     data = response(own_error_percent=np.full(6, np.nan))
-    assert "--verify-harmonics predicts" in verdicts(data, [""])[0].remedy
+    assert "with --verify-harmonics, which predicts" in verdicts(data, [""])[0].remedy
     data["contact_law"] = "contact", ["rigid_coulomb"]
     assert "no error is predicted for rigid contacts" in verdicts(data, [""])[0].remedy
 

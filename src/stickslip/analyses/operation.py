@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.column import column
 from stickslip.errors import input_error
 from stickslip.report.quantities import counted
+from stickslip.report.section import Card
 from stickslip.study.analysis import Case
 from stickslip.study.file.model.loads import Operation
 from stickslip.study.verdict import Verdict
@@ -141,16 +142,20 @@ def of_resonances(own: Operating, met: Sequence[Met], noun: str) -> Iterator[Ver
     yield Verdict("trusted", why=why, remedy=MARGIN)
 
 
-def answered(own: Operating, met: Sequence[Met], noun: str) -> tuple[str, str, str] | None:
-    """Return value, label and note of the answer about the operating range; None without a range or a resonance."""
+def answered(own: Operating, met: Sequence[Met], noun: str) -> list[Card]:
+    """Return the answer about the operating range; none without a range or a resonance."""
     if not own.known or not met:
-        return None
+        return []
     ordered = sorted(met, key=lambda one: abs(own.margin(own.at(one.rpm, one.order))))
+    question = f"the {own.name}, {own}"
     where = [own.where(own.at(one.rpm, one.order)) for one in ordered]
     if inside := where.count("inside"):
         names = ", ".join(one.name for one in ordered[: min(inside, NAMED)])
-        return str(inside), f"{noun}{'s' * (inside > 1)} inside the {own.name}, {own}", names
-    return where[0], f"margin of the nearest {noun} to the {own.name}, {own}", ordered[0].name
+        label = f"{noun}{'s' * (inside > 1)} inside {question}"
+        return [Card(str(inside), label, names, question=question, margin=-inside)]
+    margin = abs(own.margin(own.at(ordered[0].rpm, ordered[0].order)))
+    label = f"margin of the nearest {noun} to {question}"
+    return [Card(where[0], label, ordered[0].name, question=question, margin=margin)]
 
 
 def asked_of(case: Case) -> Operation:

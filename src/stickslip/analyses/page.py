@@ -1,10 +1,12 @@
 """The page of a result: one HTML file of all analyses, which needs neither network nor this package."""
 
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
@@ -18,11 +20,11 @@ from stickslip.errors import input_error
 from stickslip.report.cases import cases_of
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
 from stickslip.report.plot import Plot
-from stickslip.report.quantities import NONE, fixed, quantity
+from stickslip.report.quantities import NONE, fixed, number, quantity
 from stickslip.report.result import Node, analysis, open_result, versions
 from stickslip.report.section import Block, Card, Content, Part, Section, Table, Words, chooser
 from stickslip.study.file.case_names import CASE
-from stickslip.study.questions import ANALYSES, loaded
+from stickslip.study.questions import ANALYSES, OWN_ANALYSIS, loaded
 from stickslip.study.store.netcdf import alike, one_case
 from stickslip.study.verdict import conclusion, not_trusted, of_tree
 
@@ -40,6 +42,43 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
         data = with_bands(data, tree) if name == FORCED else with_resonance(data, tree) if name == MODES else data
         if all(name in data for name in section.needs) and data.sizes.get("case"):
             yield section, data
+    for name in tree.children:
+        if name not in ANALYSES:
+            data = analysis(tree, str(name))
+            yield _own_section(str(name), data), data
+
+
+def _own_section(name: str, data: xr.Dataset) -> Section:
+    """Return the section of a user's analysis: ``SECTION`` of its module, or else a table of its numbers.
+
+    A module that this process has not imported stays so: a result alone runs no code.
+    """
+    module = sys.modules.get(str(data.attrs.get(OWN_ANALYSIS, "")).partition(":")[0])
+    section = getattr(module, "SECTION", None)
+    if isinstance(section, Section) and all(variable in data for variable in section.needs):
+        return section
+    return Section(name, (), Node, (Block(name, name.replace("_", " ").capitalize(), (_numbers,)),), by_case=True)
+
+
+def _numbers(view: Node) -> list[Table]:
+    """Return tables of the variables of a case: its single values, and one table for each dimension."""
+    found: dict[str, list[str]] = {}
+    for variable, values in view.data.data_vars.items():
+        if values.ndim <= 1 and values.size and str(variable) not in ("case_label", "vary_value"):
+            found.setdefault(str(values.dims[0]) if values.ndim else "", []).append(str(variable))
+    return [_of_dimension(view.data, dimension, names) for dimension, names in found.items()]
+
+
+def _of_dimension(data: xr.Dataset, dimension: str, names: Sequence[str]) -> Table:
+    told = [data[name].attrs for name in names]
+    units = [f" ({own['units']})" if own.get("units", "1") != "1" else "" for own in told]
+    head = [f"{own.get('long_name', name)}{unit}" for own, name, unit in zip(told, names, units, strict=True)]
+    columns = [[_shown_value(v) for v in np.atleast_1d(data[name].values).tolist()] for name in names]
+    return Table(head, [list(row) for row in zip(*columns, strict=True)], dimension.replace("_", " ").capitalize())
+
+
+def _shown_value(value: object) -> str:
+    return number(value, 6) if isinstance(value, int | float) else str(value)
 
 
 def _views(section: Section, data: xr.Dataset) -> list[Any]:
@@ -89,6 +128,13 @@ def _cards(section: Section, data: xr.Dataset, views: Sequence[Any]) -> list[Car
     return [replace(card, note="; ".join(filter(None, (card.note, case)))) for card in own]
 
 
+def one_a_question(cards: Sequence[Card]) -> list[Card]:
+    """Return the cards; of several with the same question the one with the least margin, at the place of the first."""
+    least = {card.question: card for card in sorted(cards, key=lambda card: -card.margin)}
+    own = [least[card.question] if card.question else card for card in cards]
+    return [card for k, card in enumerate(own) if not card.question or card not in own[:k]]
+
+
 def _chapter(viewed: Viewed, block: Block, placing: Placing, above: Plot | None) -> Chapter | None:
     """Return a chapter for all cases, or one for each case with buttons; None for an empty one. The figure `above` is not drawn again."""
     section, data, views = viewed
@@ -96,7 +142,7 @@ def _chapter(viewed: Viewed, block: Block, placing: Placing, above: Plot | None)
         placing(own for own in _contents(block.parts, view) if above is None or getattr(own, "key", "") != above.key)
         for view in views
     ]
-    if not any(bodies):
+    if all(placed.kind == "chooser" for body in bodies for placed in body):  # buttons that choose nothing
         return None
     if len(bodies) == 1:
         n = data.sizes["case"] if section.by_case else 1
@@ -156,7 +202,7 @@ def report_html(tree: xr.DataTree) -> str:
     ranked = _answering_first(shown)
     above = _answer(ranked)
     figure = placing([*([above] if above else []), *_contents((waves.states,), nodes)])
-    cards = [card for own in ranked for card in _cards(*own)]
+    cards = one_a_question([card for own in ranked for card in _cards(*own)])
     each = (_chapter(own, block, placing, above) for own in shown for block in own[0].blocks)
     chapters = [chapter for chapter in each if chapter is not None]
     body = placing(_contents((nonlinear_mode.over_responses,), nodes))

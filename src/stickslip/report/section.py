@@ -95,12 +95,17 @@ Part = Callable[[Any], Shown]  # takes a view of the dataset
 
 @dataclass(frozen=True)
 class Card:
-    """A number at the top of the page, its name and a remark; red for danger. The first one of a page is its answer."""
+    """A number at the top of the page, its name and a remark; red for danger. The first one of a page is its answer.
+
+    Of several cards with the same `question` the page shows the one with the least `margin`.
+    """
 
     value: str
     label: str
     note: str
     danger: bool = False
+    question: str = ""
+    margin: float = 0.0
 
 
 @dataclass(frozen=True)

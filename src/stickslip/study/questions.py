@@ -52,6 +52,7 @@ def _waves(name: str, table: str, axes: tuple[str, ...] = ()) -> Home:
     return Home(f"{own}.{name}:{name.upper()}", f"{own}.tables:{table}", f"{own}.page.{name}:SECTION", (*_WAVE, *axes))
 
 
+OWN_ANALYSIS = "own_analysis"  # attribute of the node of a user's analysis: its address
 # names of the variables that become coordinates
 _HZ = ("frequency_hz",)
 _SYNTHESIS = ("frequency_hz", "backbone_frequency_hz", "direct_frequency_hz", "passage_frequency_hz")

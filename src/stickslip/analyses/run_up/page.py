@@ -1,6 +1,7 @@
 """The run-up: a Campbell diagram with the response on it, amplitudes over speed, static forces."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -254,12 +255,10 @@ def _cards(view: RunUpView) -> list[Card]:
     own = view.found.operating
     met = [Met(f"engine order {li.engine_order}", li.engine_order, li.peak_speed_rpm) for li in known if li.peak_inside]
     operating = answered(own, met, "peak")
-    if operating is None:
-        return [first]
     largest = max(size for size, _ in map(view.found.largest_in_operation, known))
-    value, label, note = operating
-    note += f"; largest amplitude there {quantity(largest, 'm')}" * bool(np.isfinite(largest))
-    return [first, Card(value, label, note)]
+    told = f"; largest amplitude there {quantity(largest, 'm')}" * bool(np.isfinite(largest))
+    # peaks of a response, whose place no other card answers
+    return [first, *(replace(card, note=card.note + told, question="") for card in operating)]
 
 
 _NEEDS = ("engine_orders", "speed_rpm", "amplitude", "stuck_hz")

@@ -1,5 +1,6 @@
 """Forced responses on the page: the numbers at its head, the table of cases, and the order of all figures and tables."""
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -69,8 +70,10 @@ from stickslip.report.quantities import (
 )
 from stickslip.report.section import Block, Card, Section, Table
 from stickslip.study.coordinates import naming_of
-from stickslip.study.verdict import LEVELS
+from stickslip.study.verdict import LEVELS, stored
 
+_AT_PEAK = 1e-6  # relative distance of a verdict's frequency from that of the peak
+_END = re.compile(r"; |: |\. (?=[A-Z])")  # of the action in a remedy; its reasons follow
 _ALIKE = 0.01  # largest difference of equal peaks, relative to the largest peak
 
 
@@ -148,24 +151,44 @@ VARY = "[vary] of a study file, stickslip.compare in Python"
 
 
 def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
-    """Return the next step: settle a doubt, sweep farther, compute beyond the last value, or refine between neighbours."""
+    """Return the next step with its key: the remedy of a doubt, a wider sweep, more load, or further values."""
     if response.trust(best):
-        return [f"Next: settle why it is {response.level(best)}, see above"]
+        return [f"Next: {remedy}" for remedy in _remedies(response, best)[:1]]
     if not response.resonates(best):
-        return ["Next: sweep over a wider range"]
+        return [f"Next: widen forced_response.{Curve(response.data, best.index).range_key}"]
     if idle:
-        return ["Next: press the contacts less or excite more, until they slip"]
+        return ["Next: raise load.NAME.force_n, or press the contacts less, until they slip"]
+    return _further(response, best)
+
+
+def _further(response: Response, best: ShownCase) -> list[str]:
+    """Return which values of what was varied to add: beyond the last one, or beside the best one."""
     key = first_number(response.data)[0]
     if not key:
         return [] if len(response.cases) > 1 else [f"Next: vary the load or the damper ({VARY})"]
     family = next(own for own in families_of(response.data, key, response.peaked).values() if best in own)
     at, naming = family.index(best), naming_of(response.data, key)
+    if len(family) < 2:
+        return []
     if at in (0, len(family) - 1):
-        return (
-            [f"Next: compute beyond {naming.name(best.value)}, a smaller one may lie there"] if len(family) > 1 else []
-        )
+        side = "below" if at == 0 else "above"  # families rise with the value
+        return [f"Next: give [vary] {key} values {side} {naming.value(best.value)}, where a smaller peak may lie"]
     low, high = (naming.value(family[k].value) for k in (at - 1, at + 1))
-    return [f"Next: refine {naming.word} between {low} and {high}"]
+    return [f"Next: give [vary] {key} values between {low} and {high}"]
+
+
+def _remedies(response: Response, case: ShownCase) -> list[str]:
+    """Return the remedies, each without its reasons, of the verdicts that set the level of a case: on all of it, or on its peak."""
+    hz, level = response.peak_hz(case), response.level(case)
+    found = [
+        v.remedy
+        for v in stored(response.data.attrs)
+        if v.level == level
+        and v.case in ("", case.label)
+        and (v.frequency_hz is None or abs(v.frequency_hz - hz) <= _AT_PEAK * hz)
+        and v.remedy
+    ]
+    return [remedy[:1].lower() + _END.split(remedy, maxsplit=1)[0][1:].removesuffix(".") for remedy in found]
 
 
 def _operation_card(response: Response) -> Card | None:

@@ -35,7 +35,7 @@ from stickslip.solve.status import Status
 from stickslip.study.verdict import Level, from_json
 from stickslip.units import LARGEST_PERCENT, millimetres
 
-IN_TIME = "--verify integrates in time at the peak"
+IN_TIME = "run with --verify, which integrates in time at the peak"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,29 @@ def in_time_there(case: Curve, point: int) -> str:
     """Return the remedy of a time integration at a point; in a sweep ``--verify`` integrates only at the peak."""
     if point == case.peak or case.range_key == "speed_rpm":
         return IN_TIME
-    return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
+    return f"run forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone with --verify, which integrates in time there"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _direction(case: Curve) -> str:
+    """Return the key that turns the sweep round."""
+    return f'forced_response.direction = "{"down" if case.forward > 0 else "up"}"'
+
+
+def _other_way(case: Curve) -> str:
+    return f"Sweep the other way ({_direction(case)})"
+
+
+def _beyond(case: Curve) -> str:
+    """Return the key of the range, and the end at which the largest amplitude stands."""
+    middle = 0.5 * (case.numbers.lowest_hz + case.numbers.highest_hz)
+    place = "below" if case.peak_hz < middle else "beyond"
+    at = case.points.speed_rpm[case.peak]
+    shown = f"{at:.5g} rpm" if case.range_key == "speed_rpm" and np.isfinite(at) else f"{case.peak_hz:.5g} Hz"
+    return f"forced_response.{case.range_key} to values {place} {shown}"
 
 
 def without_place(sentence: str) -> str:
@@ -83,8 +105,8 @@ LEFT = "unstable: a machine does not stay there"
 LEAVING = dict.fromkeys(
     ("period doubling", "branch point"), 'forced_response.bifurcations = "branches" follows what leaves there.'
 )
-FEWER = f"More time does not help. Fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates. Otherwise stability stays undecided."
-OPEN = "Neither more time nor fewer modes help. More harmonics make the errors of multipliers smaller."
+FEWER = f"Keep fewer modes in [reduction] or fewer contact points, for less than {MOST_IN_TIME} coordinates in all. More time does not help, and otherwise stability stays undecided."
+OPEN = "Raise harmonics.high: more harmonics make the errors of multipliers smaller. Neither more time nor fewer modes help."
 IN_TIME_TELLS = "; an integration in time (--verify) tells more"  # remedy of a verdict
 
 
@@ -95,16 +117,16 @@ def stability(case: Curve) -> Iterator[Finding]:
         why = why.removesuffix(IN_TIME_TELLS)
         if word == "unstable" and point == case.peak:
             why = f"a machine does not stay there: {why}"
-            remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."
+            remedy = f"{_other_way(case)} for the motion it leaves for, or run with --verify."
             yield Finding("wrong", why, remedy, (point,))
         elif word == "neutral" and point == case.peak and not lacks_damping(case):
-            remedy = "Damping decides whether a machine keeps this motion: give [damping], or a contact that slips."
+            remedy = "Give [damping], or a contact that slips: damping decides whether a machine keeps this motion."
             yield Finding("trusted", f"the peak is {why}", remedy, (point,))
         elif word == "undecided" and not case.attained[point] and point not in case.known:
             why = f"stability {why}"
             told = [why, *map(str, case.read(MotionsInTime).not_periodic_sentence)]
             known = next(filter(None, map(fewer, told)), "")
-            remedy = known or f"{in_time_there(case, point)}, and sees whether the motion stays."
+            remedy = known or f"{_capital(in_time_there(case, point))}, and sees whether the motion stays."
             if case.steps:
                 remedy = f"Give forced_response.steps_per_period = {2 * case.steps}."
             yield Finding("doubtful", why, remedy, (point,))
@@ -121,7 +143,7 @@ def unstable_stretches(case: Curve) -> Iterator[Finding]:
             if abs(said.not_periodic_frequency_hz / hz - 1.0) < ATTAINED / 100
         ]
         why = f"the largest motion, {millimetres(larger)} at {hz:.4g} Hz, is unstable; the peak is the largest motion that a machine keeps"
-        yield Finding("trusted", "; ".join([why, *there[:1]]), "See the stability of the points.")
+        yield Finding("trusted", "; ".join([why, *there[:1]]), "The chapter Checks has the stability of each point.")
     elif off.size:
         low, high = case.hz[off].min(), case.hz[off].max()
         why = f"{off.size} of {case.hz.size} points, {low:.4g} to {high:.4g} Hz, are unstable: a machine does not stay there"
@@ -138,7 +160,7 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
             f"bifurcations may be missed: {hz.size} of {judged.sum()} motions along the branch could not be judged, between "
             f"{hz.min():.2f} and {hz.max():.2f} Hz"
         )
-        remedy = "More harmonics make the errors of multipliers smaller; --verify integrates in time at the peak."
+        remedy = f"Raise harmonics.high, which makes the errors of multipliers smaller, or {IN_TIME}."
         yield Finding("trusted", why, remedy)
     left = case.read(SideBranches).side_branch_frequency_hz
     for said in each(case.read(BifurcationRows)):
@@ -187,9 +209,7 @@ def small_motions(case: Curve) -> Iterator[Finding]:
     )
     if told:
         why = f"the motion at the peak is too large for linear kinematics: {'; '.join(told)}"
-        remedy = (
-            "Check units, the size of the loads and the damping; if they are right, a model of large motions is needed."
-        )
+        remedy = "Check units, load.NAME.force_n and [damping]; if they are right, a model of large motions is needed."
         yield Finding("doubtful", why, remedy)
 
 
@@ -201,13 +221,13 @@ def model_itself(case: Curve) -> Iterator[Finding]:
             own.modes_peak_change,
             own.modes_frequency_change_hz,
             "with half again as many modes in the reduction",
-            "Keep more modes ([reduction] modes).",
+            "Raise reduction.fixed_interface_modes, or what else sets their number.",
         ),
         (
             own.points_peak_change,
             own.points_frequency_change_hz,
             f"with half the points of its contacts ({own.points_left_out} left out)",
-            "Mesh the contacts more finely, and compare.",
+            "Mesh the contacts more finely, or give them more points, and compare.",
         ),
     ):
         if abs(change) > case.limit:
@@ -230,7 +250,7 @@ def other_motions(case: Curve) -> Iterator[Finding]:
             f"another motion of {millimetres(size)} exists at {hz:.2f} Hz, where the response has {millimetres(float(said.another_known))}: "
             f"found from {said.another_start}{state}"
         )
-        remedy = "Which one a machine takes depends on its history: [all_motions] looks for all of them."
+        remedy = "Add [all_motions], which looks for all of them: the history of a machine decides which one it takes."
         yield Finding("doubtful" if larger else "trusted", why, remedy, size=size)
 
 
@@ -279,17 +299,19 @@ def unsolved(case: Curve) -> Iterator[Finding]:
     """Mark unconverged points as wrong, and doubt a peak found among the remaining points."""
     lost = np.flatnonzero(~case.converged)
     if lost.size == case.hz.size:
-        remedy = "See run.log for the causes, and check the size of the loads."
+        remedy = "Read the causes in run.log, and check load.NAME.force_n and the contact stiffness."
         yield Finding("wrong", "no point converged: there is no peak", remedy)
         return
     for i in lost:
         status, marched = Status(int(case.points.status[i])), str(case.points.marched_sentence[i])
         advice = [status.advice, *filter(None, [marched])]
         why = f"did not converge ({'; '.join(advice)})"
-        remedy = f"A smaller step ({case.nearer}) finds most such points."
+        remedy = f"Take {case.nearer}: a smaller step finds most such points."
         if status == Status.NOT_PERIODIC:
             why = f"attains no periodic motion ({'; '.join(advice)})"
-            remedy = "What is not periodic tells its envelope in time; forced_response.not_periodic_points sets the number of such points."
+            remedy = (
+                "Raise forced_response.not_periodic_points, the number of points whose envelope in time is computed."
+            )
         yield Finding("wrong", why, remedy, (int(i),))
     if lost.size:
         why = f"{lost.size} points did not converge; the peak is the largest of the others, and one of these points may be larger"
@@ -312,7 +334,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (int(i),), float(own), error_text(own))
         elif np.isnan([own, case.reference[i], case.integrated[i]]).all():
             why = f"the error of H = {case.kept[i]} is not known, as its harmonics were not examined"
-            yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
+            yield Finding("doubtful", why, f"{_capital(_examination(case))}.", (int(i),))
 
 
 def _coarse(case: Curve) -> Iterator[Finding]:
@@ -334,7 +356,7 @@ def _more(case: Curve, point: int) -> str:
         return f"Give {case.nearer}, or a narrower range. The search for up to {case.cap} harmonics used up its share of work, or found no solution nearby"
     if case.cap < RUNGS[-1]:
         return f"Raise limits.work_s or limits.memory_gb, which allow {case.cap} harmonics at most"
-    return f"No study keeps more than {case.cap} harmonics"
+    return f"Judge it in time, as no study keeps more than {case.cap} harmonics"
 
 
 def _of_selection(selection: str) -> str:
@@ -348,8 +370,8 @@ def _of_selection(selection: str) -> str:
 
 def _examination(case: Curve) -> str:
     if case.rigid:
-        return "Compare with a larger harmonics.high; no error is predicted for rigid contacts"
-    return "--verify-harmonics predicts at every point what more would change, --verify integrates in time at the peak"
+        return "compare with a larger harmonics.high; no error is predicted for rigid contacts"
+    return f"run with --verify-harmonics, which predicts at every point what more would change, or {IN_TIME}"
 
 
 def audited(case: Curve) -> Iterator[Finding]:
@@ -372,8 +394,8 @@ def not_audited(case: Curve) -> Iterator[Finding]:
         at_peak = case.peak >= 0 and bool(few[case.peak])
         where = ", the peak among them" if at_peak else ""
         why = f"H = {case.low} was accepted at {few.sum()} point{'s' * int(few.sum() != 1)} by predictions alone{where}; none was solved with more harmonics"
-        audits = "" if case.auto else 'harmonics.high = "auto" audits some; '
-        remedy = f"{audits}{_examination(case)}."
+        audits = "" if case.auto else 'give harmonics.high = "auto", which audits some; or '
+        remedy = f"{_capital(audits + _examination(case))}."
         yield Finding("doubtful" if at_peak else "trusted", why, remedy)
 
 
@@ -411,7 +433,7 @@ def on_other_motions(case: Curve) -> Iterator[Finding]:
         sure = case.peak not in (i, j) and case.sure[i] and case.sure[j]
         unlike = "" if sure or kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
         why = f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): a machine takes one of several periodic motions, depending on its history{unlike}"
-        remedy = f'Take {case.nearer} there, and sweep both ways (direction = "down").'
+        remedy = f"Take {case.nearer} there, and sweep the other way, too ({_direction(case)})."
         yield Finding("trusted" if sure else "doubtful", why, remedy, (i, j), jump.size)
 
 
@@ -431,7 +453,9 @@ def folds(case: Curve) -> Iterator[Finding]:
     )
     remedy = "Points outside the asked range belong to the fold."
     if inside:
-        remedy = 'Which motion a machine takes depends on its history: sweep both ways (direction = "down"), and see --verify.'
+        remedy = (
+            f"{_other_way(case)}, too, and run with --verify: the history of a machine decides which motion it takes."
+        )
     yield Finding("doubtful" if doubted else "trusted", why, remedy)
 
 
@@ -443,13 +467,13 @@ def in_time(case: Curve) -> Iterator[Finding]:
             why = (
                 f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
             )
-            yield Finding("doubtful", why, "The amplitude is uncertain by this much.", (point,))
+            yield Finding("doubtful", why, f"Allow {max(wanders, abs(off)):.2g} % for it in the amplitude.", (point,))
         elif point in case.unstable and point != case.peak:
             continue  # no doubt: `unstable_stretches` reports it
         elif motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
             why = f"the motion in time, started from it, {what}: {without_place(str(said.verify_sentence))}"
-            remedy = "Believe the time integration; sweep the other way for the motion it goes to."
+            remedy = f"{_other_way(case)} for the motion it goes to, and believe the time integration."
             yield Finding("wrong", why, remedy, (point,))
         elif motion == "next to it":
             why = f"the motion in time ends on another motion {off:+.2g} % away, to which more harmonics do not lead"
@@ -457,7 +481,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (point,))
         elif motion == "not settled":
             why = "a time integration did not settle to a periodic motion"
-            remedy = "The table of checks says what drifts or rings on."
+            remedy = "Give [damping] to what rings on and [retention] to what drifts; the table of checks names it."
             yield Finding("doubtful", why, remedy, (point,))
         elif not abs(off) <= (allowed := case.allowed_in_time(point)):
             why = f"time integration and harmonic balance differ by {_difference_text(off)}, more than {allowed:g} %"
@@ -517,14 +541,14 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
             f"the largest amplitude stands at {case.peak_hz:.2f} Hz, beyond what was asked for ({asked}), where the branch goes round a "
             "fold"
         )
-        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
+        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key} to hold {case.peak_hz:.4g} Hz.")
     elif case.at_the_end and case.hz.size > 1:  # a single frequency has no peak
         why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
         if case.hump >= 0:
             size, hz = 1e3 * case.amplitude[case.hump], case.hz[case.hump]
             why += f"; inside the sweep the largest maximum is {size:.4g} mm at {hz:.2f} Hz"
         remedy = (
-            f"Widen forced_response.{case.range_key}. Where contacts shift the resonance, a larger motion of its branch may reach into the "
+            f"Widen {_beyond(case)}. Where contacts shift the resonance, a larger motion of its branch may reach into the "
             "range: [all_motions] looks for it."
         )
         yield Finding("doubtful", why, remedy)

@@ -214,8 +214,7 @@ def _cards(view: Waves[Campbell]) -> list[Card]:
     count, noun = counted(len(met), "crossing").split(" ")
     note = "; ".join(filter(None, (", ".join(told), contact_state(view.found.contacts))))
     operating = answered(view.found.operating, view.found.met, "crossing")
-    first = [Card(*operating)] if operating else []
-    return [*first, Card(count if met else "No", f"{noun if met else 'crossing'} with engine orders {over}", note)]
+    return [*operating, Card(count if met else "No", f"{noun if met else 'crossing'} with engine orders {over}", note)]
 
 
 _NEEDS = (*NEEDED, "speed_rpm")

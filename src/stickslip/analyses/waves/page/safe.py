@@ -183,15 +183,16 @@ def _cards(view: Waves[Interference]) -> list[Card]:
     state = contact_state(found.contacts)
     within = f"within {number(found.margin_percent)} % of {number(view.rpm, 5)} rpm"
     near = sorted((pair for pair in found.pairs if pair.near), key=lambda pair: abs(pair.margin))
-    operating = answered(found.operating, found.met, "resonance")
-    before = [Card(*operating)] if operating else []
+    in_operation = answered(found.operating, found.met, "resonance")
+    if in_operation:  # where the machine runs, no share of one speed has to stand for it
+        return in_operation
     if not near:
-        return [*before, Card("No", f"near resonance {within}", ", ".join(filter(None, (_nearest(view), state))))]
+        return [Card("No", f"near resonance {within}", ", ".join(filter(None, (_nearest(view), state))))]
     first, *others = (_met(view, pair) for pair in near)
     more = [f"{counted(len(near), 'near resonance')} {within}", *others[: _MOST_TOLD - 1]]
     more += [f"and {len(near) - _MOST_TOLD} more"] * (len(near) > _MOST_TOLD)
     rpm = f"{number(view.rpm * (1 + near[0].margin), 5)} rpm"
-    return [*before, Card(rpm, f"{first}", "; ".join(filter(None, (", ".join(more), state))))]
+    return [Card(rpm, f"{first}", "; ".join(filter(None, (", ".join(more), state))))]
 
 
 def _met(view: Waves[Interference], pair: Pair) -> str:
