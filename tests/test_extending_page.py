@@ -100,3 +100,54 @@ def test_a_study_file_asks_for_it_after_one_entry(tmp_path: Path) -> None:
     result = ss.Study.from_file(path).run()
     assert result["slip_onset"].mode_amplitude.values[0] == pytest.approx([2e-4, 2e-4], rel=0.01)
     assert "slip begins only at 0.2" in page.report_html(result.data)
+
+
+@pytest.fixture
+def of_ones_own(tmp_path: Path) -> Iterator[Path]:
+    """A study file that names the page's analysis, in a module beside it."""
+    code = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    own = [block for block in code if block.startswith("# analyses/slip_onset")]
+    imports = ["import numpy as np", "import stickslip as ss"]
+    (tmp_path / "own_onset.py").write_text("\n".join([*imports, *own]), encoding="utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.replace("[slip_onset]", '[slip_onset]\nanalysis = "own_onset:SLIP_ONSET"'), encoding="utf-8")
+    yield path
+    sys.modules.pop("own_onset", None)
+    sys.path[:] = [entry for entry in sys.path if entry != str(tmp_path)]
+
+
+def test_a_study_file_names_an_analysis_of_ones_own(of_ones_own: Path) -> None:
+    with pytest.raises(ss.InputError, match=r"slip_onset\.analysis: names code of your own.*--allow-code"):
+        ss.Study.from_file(of_ones_own)
+    assert "own_onset" not in sys.modules
+    result = ss.Study.from_file(of_ones_own, allow_code=True).run()
+    assert result["slip_onset"].mode_amplitude.values[0] == pytest.approx([2e-4, 2e-4], rel=0.01)
+    html = page.report_html(result.data)
+    assert "slip begins only at 0.2" in html
+    assert list(page.plots(result.data)) == ["slip_onset"]
+    del sys.modules["own_onset"]  # a result alone runs no code: its numbers are shown as tables
+    assert list(page.plots(result.data)) == []
+    assert "amplitude of the output at which slip begins" in page.report_html(result.data)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ('analysis = "own_onset:MISSING"', "own_onset has no 'MISSING'"),
+        ('analysis = "own_onset:Question"', "is no analysis: it has no"),
+        ('analysis = "own_onset:SLIP_ONSET"\nmode = 2', r"slip_onset\.mode: unknown key.*modes"),
+        ("analysis = 3", "is no module path, got '3'"),
+    ],
+)
+def test_what_is_no_analysis_is_refused(of_ones_own: Path, given: str, told: str) -> None:
+    text = of_ones_own.read_text(encoding="utf-8")
+    of_ones_own.write_text(text.replace('analysis = "own_onset:SLIP_ONSET"', given), encoding="utf-8")
+    with pytest.raises(ss.InputError, match=told):
+        ss.Study.from_file(of_ones_own, allow_code=True)
+
+
+def test_the_table_has_the_name_of_its_analysis(of_ones_own: Path) -> None:
+    text = of_ones_own.read_text(encoding="utf-8")
+    of_ones_own.write_text(text.replace("[slip_onset]", "[onset]"), encoding="utf-8")
+    with pytest.raises(ss.InputError, match=r"onset\.analysis: is the analysis 'slip_onset'.*\[slip_onset\]"):
+        ss.Study.from_file(of_ones_own, allow_code=True)

@@ -10,7 +10,7 @@ import xarray as xr
 from stickslip.study.analysis import Analysis, Case, Solved, TextTable
 from stickslip.study.coordinates import with_coordinates
 from stickslip.study.models.measured import MeasuredPeaks
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, OWN_ANALYSIS
 from stickslip.study.store.journal import read_note, read_sealed
 from stickslip.study.store.netcdf import variable
 from stickslip.study.store.progress import tell
@@ -129,6 +129,8 @@ class Book:
         unsolved = sum(UNSOLVED in s.notes for s in solved)
         failed = max(int(node.attrs.get("failed", 0)), unsolved)
         own = {ATTRIBUTE: to_json(found), "failed": failed}
+        if asked.name not in ANALYSES:  # the page may find its section
+            own[OWN_ANALYSIS] = str(getattr(getattr(solved[0].case.settings, asked.name, None), "analysis", ""))
         self.nodes[asked.name] = with_coordinates(node.assign_attrs(own), asked.name)
 
     def _put_together(self) -> None:

@@ -24,7 +24,7 @@ from stickslip.study.jobs import Order, solve_job, worked
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.own_code import CODE_FILE, OwnCode, Shipped
-from stickslip.study.questions import ANALYSES
+from stickslip.study.questions import ANALYSES, loaded
 from stickslip.study.store.archive import PartStore
 from stickslip.study.store.atomic_write import whole_file, write_whole
 from stickslip.study.store.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
@@ -189,18 +189,19 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
         If `only` names an analysis that is unknown or has no table, or the study has no analysis.
     """
     for name in only:
-        if name not in ANALYSES:
-            raise input_error(f"--only {name}", "is no analysis", did_you_mean(name, list(ANALYSES)))
+        if name not in ANALYSES and name not in study.asked:
+            known = list(dict.fromkeys([*ANALYSES, *study.asked]))
+            raise input_error(f"--only {name}", "is no analysis", did_you_mean(name, known))
         if name not in study.asked:
             raise input_error(f"{study.path}: {name}", "is missing", f"Add the table [{name}] to the study.")
-    wanted = [name for name in ANALYSES if name in (only or study.asked)]
+    wanted = [name for name in study.asked if name in (only or study.asked)]
     if not wanted:
         raise input_error(
             str(study.path),
             "asks for nothing",
             f"Add a table of an analysis: {', '.join(f'[{name}]' for name in ANALYSES)}.",
         )
-    return [named(name) for name in wanted]
+    return [named(name) if name in ANALYSES else loaded(getattr(study.tables, name).analysis) for name in wanted]
 
 
 def not_used(study: Study, asked: Sequence[Analysis]) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import told
@@ -13,6 +13,9 @@ from stickslip.study.file.tables import VERSION, Tables, study_tables
 from stickslip.study.file.toml import read_toml
 from stickslip.study.file.vary import VariedCase, cases_of, value_at, varied_keys, with_values
 from stickslip.study.own_code import OwnCode
+
+# fields of an `Analysis` without a default, which the runner needs
+OF_AN_ANALYSIS = ("name", "table", "record", "key", "inputs", "solve", "dataset", "check", "summary")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +94,13 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
         Naming every problem, one a line.
     """
     _check_version(path, raw.get("schema_version"))
-    model = study_tables()
+    model = study_tables(_own_analyses(path, raw, code))
     found: list[TablesOfCase] = []
     cases = cases_of(str(path), raw, model)
-    errors = {str(one): one for one in _of_replaced(path, raw, code)}
+    errors = {str(one): one for one in _of_replaced(path, raw, code, model)}
     for case in cases:
         try:
-            found.append(_case(path, raw, case, code))
+            found.append(_case(path, raw, case, code, model))
         except InputError as error:  # an error that occurs in many cases is reported once
             errors |= {str(one): one for one in error.each()}
     if errors:
@@ -105,21 +108,37 @@ def validated(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[Tables
     return tuple(found)
 
 
-def _of_replaced(path: Path, raw: Mapping[str, Any], code: OwnCode) -> list[InputError]:
+def _own_analyses(path: Path, raw: Mapping[str, Any], code: OwnCode) -> tuple[tuple[str, type[BaseModel]], ...]:
+    """Return names and tables of the user's analyses: other tables than those of stickslip, with a key ``analysis``."""
+    found = []
+    for name, table in raw.items():
+        if name in study_tables().model_fields or not isinstance(table, Mapping) or "analysis" not in table:
+            continue
+        place = f"{path}: {name}.analysis"
+        try:
+            own = code.at(str(table["analysis"]), "analysis", OF_AN_ANALYSIS)
+        except InputError as error:
+            raise input_error(place, error.problem, error.remedy) from None
+        if own.name != name:
+            raise input_error(place, f"is the analysis {own.name!r}", f"Call the table [{own.name}].")
+        found.append((name, own.table))
+    return tuple(found)
+
+
+def _of_replaced(path: Path, raw: Mapping[str, Any], code: OwnCode, model: type[Tables]) -> list[InputError]:
     """Return errors about values that [vary] replaces in every case, which would otherwise never be checked."""
     varied = {f"{path}: {key}" for key in varied_keys(str(path), raw)}
     given = {key for key in varied if value_at(raw, key.removeprefix(f"{path}: ")) is not None}
     if not given:
         return []
     try:
-        _case(path, raw, VariedCase("", {}), code)
+        _case(path, raw, VariedCase("", {}), code, model)
     except InputError as error:
         return [one for one in error.each() if one.place in given]
     return []
 
 
-def _case(path: Path, raw: Mapping[str, Any], case: VariedCase, code: OwnCode) -> TablesOfCase:
-    model = study_tables()
+def _case(path: Path, raw: Mapping[str, Any], case: VariedCase, code: OwnCode, model: type[Tables]) -> TablesOfCase:
     try:
         tables = model.model_validate(with_values(raw, case.values), context={"study": path, "code": code})
     except ValidationError as error:

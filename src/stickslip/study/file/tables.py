@@ -4,7 +4,7 @@ import json
 from functools import cache
 from typing import Any, Literal
 
-from pydantic import Field, create_model
+from pydantic import BaseModel, Field, create_model
 
 from stickslip.contact.compiled import Evaluator
 from stickslip.response.forced.choices import Rescue
@@ -114,12 +114,18 @@ class Tables(Section):
 
 
 @cache
-def study_tables() -> type[Tables]:
-    """Return the class of the whole file, with one optional table for each analysis."""
+def study_tables(own: tuple[tuple[str, type[BaseModel]], ...] = ()) -> type[Tables]:
+    """Return the class of the whole file, with one optional table for each analysis.
+
+    Parameters
+    ----------
+    own
+        Names and tables of the user's analyses, which the file names itself.
+    """
+    tables = {name: loaded(home.table) for name, home in ANALYSES.items() if home.table}
+    tables |= {name: with_address(table) for name, table in own}
     asked: dict[str, Any] = {
-        name: (loaded(home.table) | None, Field(None, description=f"the table [{name}]"))
-        for name, home in ANALYSES.items()
-        if home.table
+        name: (table | None, Field(None, description=f"the table [{name}]")) for name, table in tables.items()
     }
     made: type[Tables] = create_model(
         "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked
@@ -127,9 +133,18 @@ def study_tables() -> type[Tables]:
     return made
 
 
+@cache
+def with_address(table: type[BaseModel]) -> type[BaseModel]:
+    """Return the table of a user's analysis with its key ``analysis``, by which the file names the analysis."""
+    address: Any = (str, Field(description="the analysis, my_module:NAME"))
+    made: type[BaseModel] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, analysis=address)
+    return made
+
+
 def asked_of(tables: Tables) -> tuple[str, ...]:
-    """Return the names of the analyses whose tables are in the file."""
-    return tuple(name for name in ANALYSES if getattr(tables, name, None) is not None)
+    """Return the names of the analyses whose tables are in the file, the user's own last."""
+    names = [name for name in type(tables).model_fields if name not in Tables.model_fields]
+    return tuple(name for name in names if getattr(tables, name) is not None)
 
 
 def json_schema() -> str:
