@@ -301,3 +301,15 @@ def test_a_disk_and_a_shaft_may_turn_about_their_own_axes() -> None:
             memo={"facts": SimpleNamespace(centre=points.mean(axis=0))},
         )
         assert len(list(axis_doubts(SimpleNamespace(parts={"shaft": part})))) == count
+
+
+def test_nodes_held_by_the_file_and_by_the_study_are_told_apart(tmp_path: Path) -> None:
+    deck = (Path(__file__).parents[1] / "examples" / "own_blades" / "blade.inp").read_text().upper()
+    fixed = re.findall(r"\d+", re.split(r"\*NSET, *NSET=ROOT[^\n]*\n", deck)[1].split("*")[0])
+    plain = read_study(write(tmp_path, FEW)).model().parts["left"]
+    assert plain.supports == f"part.left: nodes held are {len(set(fixed))} by its file"
+    assert plain.mesh is not None
+    tip = plain.mesh.node_sets["TIP"].size
+    more = read_study(write(tmp_path / "more", FEW | {"part.left.clamped": '["TIP"]'}))
+    told = more.model().parts["left"].supports
+    assert told == f"{plain.supports}, {tip} more by part.left.clamped"

@@ -172,6 +172,8 @@ class Part:
         Warnings for the user.
     clamped_sets
         Names of sets whose nodes are all clamped, so that nothing can act on them.
+    supports
+        What holds the part, in words: nodes held by its file and by the study; empty if the file has no nodes.
     own_speed
         Speed in the part's file, rad/s; 0: the file has none. All parts of a model have the same speed.
     alone
@@ -201,6 +203,7 @@ class Part:
     place: Place | None = None
     warnings: tuple[str, ...] = ()
     clamped_sets: tuple[str, ...] = ()
+    supports: str = ""
     own_speed: float = 0.0
     alone: bool = False
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # reductions already computed

@@ -53,7 +53,8 @@ def check_study(study: Study) -> tuple[str, ...]:
             with step(f"pairing the points of {len(model.contacts)} contacts"):
                 pairs = model.pairs
             every = [Advice(computed=(_size(model, len(pairs.names)),), doubts=tuple(not_used(study, asked)))]
-            every += [Advice(computed=tuple(first_nodes(model.places, model.outputs)), doubts=model.warnings)]
+            held = [part.supports for part in model.parts.values() if part.template is None and part.supports]
+            every += [Advice(computed=(*held, *first_nodes(model.places, model.outputs)), doubts=model.warnings)]
             if model.speed > 0.0 or any(one.name in OVER_SPEED for one in asked):
                 every += [Advice(doubts=tuple(axis_doubts(model)))]
             every += [_as_advice(one.check(case, model)) for one in asked]

@@ -386,6 +386,7 @@ def _solid(
         faces=faces,
         cyclic=_tied(table),
         clamped_sets=gone,
+        supports=_supports(key, mesh, free, others.get("held")),
         alone=table.sectors == 1 or not table.plausible,
         **others,
     )
@@ -481,6 +482,25 @@ def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
     root = np.array(sorted(held), dtype=np.int64)
     kept = {name: _without(members, root) for name, members in sets.items()}
     return replace(mesh, node_sets={k: m for k, m in ({ROOT: root} | kept).items() if m.size})
+
+
+def _supports(key: str, mesh: SolidMesh, free: SolidMesh, held: BoolArray | None) -> str:
+    """Say which nodes the file holds and how many the study adds.
+
+    Parameters
+    ----------
+    key
+        Key of the part.
+    mesh, free
+        Mesh of the file, and the same with the clamped nodes of the study.
+    held
+        (node, 3) directions that the file holds; None: all or none at each node.
+    """
+    own, every = (one.node_sets.get(ROOT, np.zeros(0, dtype=np.int64)).size for one in (mesh, free))
+    partly = 0 if held is None else int((held.any(axis=1) & ~held.all(axis=1)).sum())
+    told = [f"{own} by its file"] + [f"{partly} more in some directions"] * bool(partly)
+    told += [f"{every - own} more by {key}.clamped"] * (every > own)
+    return f"{key}: nodes held are {', '.join(told)}"
 
 
 def _faces(key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int) -> tuple[str, str]:
