@@ -196,6 +196,14 @@ def _of_study(path: Path) -> Result:
     return Result.from_file(folder)
 
 
+def _name_of(path: Path) -> str:
+    """Return the name of the folder of a study, for its file, its result, or the folder of its results."""
+    folder = path.parent if path.name in (RESULT, STUDY) and path.parent.name else path
+    if folder.name == _FOLDER and folder.parent.name:
+        folder = folder.parent
+    return folder.stem if folder == path and path.suffix in (".nc", ".toml", ".csv") else folder.name
+
+
 def _names(compared: Sequence[Compared]) -> list[str]:
     """Return unique names from folders, files or titles, with as much of the path as needed."""
     found = []
@@ -203,8 +211,7 @@ def _names(compared: Sequence[Compared]) -> list[str]:
         if isinstance(own, Result):
             found.append(str(own.data.attrs.get("title", "")) or "result")
         else:
-            parts = [p for p in Path(own).with_suffix("").parts if p not in (_FOLDER, "result", "study", "/")]
-            found.append(parts[-1] if parts else str(own))
+            found.append(_name_of(Path(own)))
     twice = len(set(found)) < len(found)
     if twice:
         found = [

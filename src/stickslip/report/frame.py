@@ -133,7 +133,10 @@ class Placing:
         columns = max(
             (len(map_.x) for map_ in own.figure.select_traces({"type": "heatmap"}) if map_.text is not None), default=0
         )
-        wide = min(ends, default=1.0) < 0.9 or len(list(own.figure.select_scenes())) > 1 or columns > MOST_IN_NARROW
+        beside = len(list(own.figure.select_scenes())) > 1 or (
+            any("polar" in trace.type for trace in own.figure.data) and bool(ends)
+        )
+        wide = min(ends, default=1.0) < 0.9 or beside or columns > MOST_IN_NARROW
         return Placed(own, "figure", self.figures, Markup(drawing), wide)
 
 

@@ -36,9 +36,24 @@ if (innerWidth < 800) document.querySelectorAll(".js-plotly-plot").forEach(plot 
     Plotly.relayout(plot, {height: whole.height + more, "margin.b": whole.margin.b + more});
   });
 });
+// a picture in space fills the height of its panel: in a narrow panel it is drawn smaller, so that nothing is cut at the sides
+const fit = (plot, name) => {
+  const {_size, [name]: {domain: {x, y}}} = plot._fullLayout;
+  return Math.min(1, 0.9 * _size.w * (x[1] - x[0]) / (_size.h * (y[1] - y[0])));
+};
+const scaled = (ratio, by) => ({x: by * ratio.x, y: by * ratio.y, z: by * ratio.z});
+const wide = new WeakMap(); // shapes of the scenes where there is room
+const fitted = plot => {
+  const own = (plot._fullLayout || {})._subplots, change = {}, figure = plot.closest("figure");
+  if (!own || !plot.offsetParent || figure && figure.querySelector('form.shapes[data-of="modes"]')) return; // those fit themselves
+  if (!wide.has(plot)) wide.set(plot, Object.fromEntries((own.gl3d || []).map(name => [name, plot._fullLayout[name].aspectratio])));
+  Object.entries(wide.get(plot)).forEach(([name, ratio]) => { change[`${name}.aspectratio`] = scaled(ratio, fit(plot, name)); });
+  if (Object.keys(change).length) Plotly.relayout(plot, change);
+};
+document.querySelectorAll(".js-plotly-plot").forEach(fitted);
 // a figure in what was folded away has no width until it is opened
 document.querySelectorAll("details").forEach(folded => folded.addEventListener("toggle", () => {
-  if (folded.open) folded.querySelectorAll(".js-plotly-plot").forEach(plot => Plotly.Plots.resize(plot));
+  if (folded.open) folded.querySelectorAll(".js-plotly-plot").forEach(plot => Plotly.Plots.resize(plot).then(() => fitted(plot)));
 }));
 document.querySelectorAll("button.rest").forEach(button => button.addEventListener("click", () => {
   button.closest(".table").querySelectorAll("tr[hidden]").forEach(row => { row.hidden = false; });

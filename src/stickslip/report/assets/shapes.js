@@ -172,7 +172,8 @@ document.querySelectorAll('form.shapes[data-of="motion"]').forEach(form => {
       .then(() => Plotly.restyle(plot, {visible: Boolean(shown)}, [4, 5, 6]));
   };
   if (form.elements.view) form.elements.view.addEventListener("change", () => {
-    Plotly.relayout(plot, data.views[form.elements.view.value]);
+    const view = data.views[form.elements.view.value];
+    Plotly.relayout(plot, {...view, "scene.aspectratio": scaled(view["scene.aspectratio"], fit(plot, "scene"))});
   });
   const section = form.closest("section");
   if (section) section.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {

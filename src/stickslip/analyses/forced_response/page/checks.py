@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 
 from stickslip.analyses.forced_response.page.response import Response
 from stickslip.analyses.forced_response.records.columns import ExaminedRows, MotionsInTime, Shots, TimeChecks, read
-from stickslip.analyses.forced_response.stability.stable_words import FEW, all_lines
+from stickslip.analyses.forced_response.stability.stable_words import FEW, all_lines, counts_line, of_case, runs_line
 from stickslip.arrays import FloatArray
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import (
@@ -42,11 +42,30 @@ def stability(response: Response) -> list[Table | Words]:
     text = "Does a small disturbance of the motion die? In each period it is multiplied by the largest multiplier. Above 1 by more than its error, the machine leaves the motion. If the error bar contains 1, time integration decides, or stability stays undecided."
     head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
     told = any(str(own.stability_sentence) for _, own in found)
+    every = response.table("", (), head, rows, folded=f"All {len(rows)} points")
+    if told and len(response.cases) > 1 and len(rows) > FEW:
+        return [_stability_of_cases(response, text), every]
     lines = all_lines(response.data, [c.label for c in response.cases]) if told else ()
     if len(rows) > FEW:
-        every = response.table("", (), head, rows, folded=f"All {len(rows)} points")
         return [Words((text,), "Stability", lines), every]
     return [response.table("Stability", (text,), head, rows, items=lines)]
+
+
+def _stability_of_cases(response: Response, text: str) -> Table:
+    """Return a table with one row a case: known points, verdicts along the branch, and the peak."""
+    rows = []
+    for case in response.cases:
+        points = of_case(response.data, case.index)
+        if not points:
+            rows.append([case.short, counts_line(response.data, case.index) or NONE, NONE, NONE])
+            continue
+        peak = min(points, key=lambda p: abs(p.hz - response.peak_hz(case)))
+        size = f", multiplier {modulus_text(peak.multiplier, peak.error)}" if np.isfinite(peak.multiplier) else ""
+        known, _, verdicts = runs_line(points).partition(": ")
+        count = counts_line(response.data, case.index) or f"all {known}"
+        rows.append([case.short, count, verdicts, f"{peak.verdict}{size}"])
+    head = ["examined", "verdicts of the examined points", "nearest to the peak"]
+    return response.table("Stability", (text,), head, rows, numeric=False)
 
 
 def shooting(response: Response) -> Table | None:

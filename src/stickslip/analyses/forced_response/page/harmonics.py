@@ -4,6 +4,8 @@ The errors are the predicted and real ones of first solutions, or the strategy's
 """
 
 from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -167,7 +169,7 @@ def choice(response: Response) -> list[Table | Words]:
     alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
     if response.auto:
         alert, text = _auto_row, _auto_text
-        middle = ("harmonics kept", "largest error predicted of what was accepted; found by audits, which overrule it")
+        middle = ("harmonics kept", "largest error: predicted; found by audits")
     elif response.is_error:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text
@@ -177,7 +179,14 @@ def choice(response: Response) -> list[Table | Words]:
         told.append(cost_sentence(response.data))
     found = response.table("", told, [*middle, "why"], rows, numeric=False)
     said = response.text("alert_explanation")
-    return [found, Words((said,), folded="As the run put it")] if said else [found]
+    return [found, Words((), items=_each_case(said, response), folded="In the words of the run")] if said else [found]
+
+
+def _each_case(said: str, response: Response) -> Sequence[str]:
+    """Return a text on all cases as one entry a case."""
+    places = sorted(said.find(f"{case.label}: ") for case in response.cases if case.label)
+    cuts = [place for place in places if place > 0]
+    return [said[a:b].strip() for a, b in pairwise([0, *cuts, len(said)])]
 
 
 _REASON = "A contact that slips or lifts off makes forces at multiples of the excitation frequency. A solution with few harmonics misses them."

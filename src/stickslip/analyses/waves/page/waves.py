@@ -110,9 +110,17 @@ def mode_lines(view: Waves[Modes] | Waves[Interference]) -> list[go.Scatter]:
     return traces
 
 
+NARROW_BAND = 0.1  # width of a family of frequencies over the highest one, below which the axis does not begin at zero
+
+
 def diameter_axes(figure: go.Figure, view: Waves[Modes] | Waves[Interference]) -> None:
     """Label the axes of a figure over nodal diameters."""
     highest = max(w.nodal_diameter for w in view.found.waves)
     figure.update_xaxes(title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4])
     figure.update_xaxes(dtick=1 if highest <= 30 else None)
-    figure.update_yaxes(title_text="frequency (Hz)", rangemode="tozero")
+    hz = hertz(view.found)
+    low, high = float(np.nanmin(hz)), float(np.nanmax(hz))
+    # a family whose waves differ by little would be one flat line above zero
+    near = 0.0 < high - low < NARROW_BAND * high
+    zoom = {"range": [low - 0.15 * (high - low), high + 0.15 * (high - low)]} if near else {"rangemode": "tozero"}
+    figure.update_yaxes(title_text="frequency (Hz)", **zoom)

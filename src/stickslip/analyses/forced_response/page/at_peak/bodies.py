@@ -160,6 +160,9 @@ def _energy_traces(figure: go.Figure, response: Response, values: FloatArray, to
                 row=1,
                 col=1,
             )
+        if peak >= 0 and not np.nansum(np.abs(values[peak])):  # else the panel of this case would be blank
+            said = {"x": [names[len(names) // 2]], "y": [0.5], "text": ["nothing is dissipated"], "mode": "text"}
+            figure.add_scatter(**said, meta=case.index, showlegend=False, hoverinfo="skip", row=1, col=1)
     named = response.cases if len(response.cases) <= FEW else extremes(response)
     for case in named:
         at, line = response.points(case), {"color": case.colour, "width": 1.6}

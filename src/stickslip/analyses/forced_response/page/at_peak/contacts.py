@@ -168,6 +168,9 @@ def _hysteresis(response: Response, direction: str) -> list[Plot]:
     return found
 
 
+TITLED = 3  # panels in a row up to which the title of an axis has one line
+
+
 def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points: list[int]) -> tuple[go.Figure, str]:
     """Return the panels of contact points in a tangential direction, and a sentence on removed means."""
     names, rows = response.labels("contact"), _wrapped([points])
@@ -200,7 +203,9 @@ def _loops(response: Response, cases: tuple[ShownCase, ...], column: int, points
     for j in range(width):
         last = max(i for i, row in enumerate(rows) if j < len(row))
         figure.update_xaxes(
-            title_text=f"relative displacement{'<br>about its mean' * moved} (µm)", row=last + 1, col=j + 1
+            title_text=f"relative{'<br>' if width > TITLED else ' '}displacement{'<br>about its mean' * moved} (µm)",
+            row=last + 1,
+            col=j + 1,
         )
     out = [word for word, off in (("displacements", moved), ("forces", pulled)) if off]
     return figure, f" The mean is taken out of the {joined(out)}." if out else ""
