@@ -231,6 +231,27 @@ def test_a_job_leaves_one_line_and_points_are_said_where_they_are_asked_for() ->
         assert lines[-1] == "response: a = 1: peak 2 mm (0 s)"
 
 
+@pytest.mark.parametrize(
+    ("wall", "cpu", "told"),
+    [
+        (400.0, 90.0, "(400 s, 90 s of CPU)"),  # the machine does other work
+        (100.0, 95.0, "(100 s)"),
+        (100.0, 0.5, "(100 s)"),  # another process computes
+        (10.0, 2.0, "(10 s)"),
+    ],
+)
+def test_a_job_on_a_busy_machine_says_its_cpu_time(
+    wall: float, cpu: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = {"monotonic": 0.0, "process_time": 0.0}
+    monkeypatch.setattr("stickslip.api.screen.monotonic", lambda: now["monotonic"])
+    monkeypatch.setattr("stickslip.api.screen.process_time", lambda: now["process_time"])
+    screen, stream = said(warnings=False)
+    with on_screen(screen), at_work("modes"):
+        now |= {"monotonic": wall, "process_time": cpu}
+    assert stream.getvalue().splitlines()[-1] == f"modes: done {told}"
+
+
 def test_a_silent_run_says_where_it_is_without_a_terminal() -> None:
     stream = io.StringIO()
     screen = Screen(Console(file=stream, width=200), quiet=0.05)

@@ -238,8 +238,8 @@ def test_error_is_taken_where_the_study_says(base: Study, over: object) -> None:
     study = changed(base, {"alert_over": over, "alert_harmonics": [0, 1]}, "over")
     said = check(study)
     count = {"outputs": 9, "contacts": 27}.get(str(over), 3)
-    line = next(x for x in said.computed if "its error is that of" in x)
-    assert "harmonic 0, 1 over" in line
+    line = next(x for x in said.computed if "its error counts harmonic" in x)
+    assert "harmonic 0, 1 of" in line
     assert line.count(",") == count  # one more than between the labels: that of the harmonics
     mixed = "harmonics.alert_over mixes rotations (damper.rx) with displacements (tip1.x, damper.z)"
     assert any(x.startswith(mixed) for x in said.doubts) == ("damper.rx" in over)
@@ -266,7 +266,7 @@ def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> 
         r"estimate: contacts slip at the resonance \(stuck, a friction force would be [\d.]+ times its limit\)",
         r"estimate: harmonics are uncertain, here H = 15, at most H = 41 at 10 % of \d+ points",
         r"estimate: at most \d+ Newton steps, \d+ unknowns, [\d.]+ GB of memory",
-        r"estimate: on top come stability, audits and time integration, of doubted points up to some 120 s a case",
+        r"estimate: stability, audits and time integration come on top; doubted points take up to 120 s a case",
         r"estimate: limits\.work_s is compared with \d+ s",
     )
     for pattern, line in zip(cost, said.computed[1:7], strict=True):

@@ -366,7 +366,7 @@ def test_a_material_of_a_file_that_becomes_steel_is_doubted(tmp_path):
     path.write_text(head + "expansion_per_k = 9e-6\n")
     (said,) = read_study(path).model().parts["b"].warnings
     assert said.startswith(
-        "part.b: its material replaces that of the file, and density_kg_per_m3, young_modulus_pa, poisson_ratio,"
+        "part.b: its material replaces the file's, and density_kg_per_m3, young_modulus_pa, poisson_ratio,"
     )
     path.write_text(head + "young_modulus_pa = 1e11\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 4400.0\n")
     assert read_study(path).model().parts["b"].warnings == ()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from html import escape
-from time import monotonic
+from time import monotonic, process_time
 from typing import Any
 
 from rich.console import Console
@@ -21,6 +21,9 @@ LOG = logging.getLogger("stickslip")
 STEPS = 10  # plain lines of the progress of a job
 QUIET = 30.0  # seconds without a line, after which the progress of running jobs is printed
 FULL = "━" * 10  # the bar of a finished job
+LONG = 20.0  # seconds of a job from which its CPU time is told where it is less than ...
+BUSY = 0.7  # ... this share of them; below the other share the job ran in another process
+WATCHING = 0.02
 _BETWEEN = 0.2  # seconds between two drawings
 _WIDTH = 24  # characters of a bar
 
@@ -109,12 +112,15 @@ class At:
         Stage and point, in words.
     task
         Its bar; None without a terminal.
+    spent
+        CPU time of this process at its first record.
     """
 
     begun: float
     fraction: float = 0.0
     text: str = ""
     task: TaskID | None = None
+    spent: float = 0.0
 
 
 class Screen(logging.Handler):
@@ -210,7 +216,7 @@ class Screen(logging.Handler):
             return
         if job and job not in self._at:  # the model is complete
             self._forget("")
-        at = self._at.setdefault(job, At(monotonic() if job else self._begun))
+        at = self._at.setdefault(job, At(monotonic() if job else self._begun, spent=process_time()))
         at.fraction, at.text = max(at.fraction, fraction or 0.0), "" if text == job else text
         if self._progress is not None:
             self._draw(job, at)
@@ -243,8 +249,11 @@ class Screen(logging.Handler):
 
     def _done(self, job: str) -> None:
         """Print the line of a finished job."""
-        at = self._at.get(job, At(monotonic()))
-        told = f"{job}: {self._sums.get(job, DONE)} ({monotonic() - at.begun:.0f} s)"
+        at = self._at.get(job, At(monotonic(), spent=process_time()))
+        took, computed = monotonic() - at.begun, process_time() - at.spent
+        beside = took > LONG and WATCHING * took < computed < BUSY * took
+        cpu = f", {computed:.0f} s of CPU" * beside  # what `check` estimates, on a machine that does other work, too
+        told = f"{job}: {self._sums.get(job, DONE)} ({took:.0f} s{cpu})"
         bar = f"{FULL} " * (at.task is not None)
         self._forget(job)
         self._line(f"{bar}{told}")

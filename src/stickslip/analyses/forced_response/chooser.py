@@ -115,7 +115,7 @@ class Chooser:
             return [
                 f"raised from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below {self.limit}",
                 "audited at every tenth point and at the peak",
-                f"its error is that of harmonic {of} over {listed(self.over)}",
+                f"its error counts harmonic {of} of {listed(self.over)}",
             ]
         how = (
             "single passage: each frequency is settled before the next one"
@@ -131,7 +131,7 @@ class Chooser:
         ]
         if self.is_error:
             of = ", ".join(map(str, self.harmonics))
-            said.append(f"its error is that of harmonic {of} over {listed(self.over)}")
+            said.append(f"its error counts harmonic {of} of {listed(self.over)}")
         elif passages_asked == "double":
             said.append(
                 f"{self.name} foretells the harmonics of the next frequency or raises them step by step, which needs a single "

@@ -105,7 +105,7 @@ class Estimate:
             f"estimate: {_of_slip(self.slips)}",
             *[f"estimate: harmonics are uncertain{self._some}, at most {self.most}"] * bool(harmonics),
             f"estimate: at most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of memory",
-            f"estimate: on top come stability, audits and time integration, of doubted points up to some {SECONDS_OF_DOUBTS:.0f} s a case",
+            f"estimate: stability, audits and time integration come on top; doubted points take up to {SECONDS_OF_DOUBTS:.0f} s a case",
             f"estimate: limits.work_s is compared with {self.seconds:.0f} s",
         )
 

@@ -153,7 +153,7 @@ def shooting_lines(model: Assembled, sweep: Sweep, stepping: TimeStepping) -> tu
     """Return the lines of ``stickslip check`` on a response by shooting."""
     rows, steps = 2 * model.system.structure.n, stepping.steps_per_period
     return (
-        f"shooting: {sweep.grid.size} frequencies, {steps} steps a period, {rows} states and those of the contacts",
+        f"shooting: {sweep.grid.size} frequencies, {steps} steps a period, {rows} states beside the contacts'",
         f"shooting: the first {sweep.high_harmonics[-1]} harmonics of each motion are stored",
         f"shooting: up to {MAX_PERIODS} periods a frequency, some 20 as a rule",
     )

@@ -340,7 +340,7 @@ def _of_other_speed(known: Reference | None, rpm: float) -> list[Verdict]:
     if not others:
         return []
     speeds = ", ".join(f"{s:g} rpm" for s in others)
-    why = f"the frequencies of modes.reference are of {speeds}, those of [modes] of {rpm:g} rpm: the differences include the effect of speed"
+    why = f"modes.reference has frequencies at {speeds}, and [modes] at {rpm:g} rpm: the differences include the effect of speed"
     return [Verdict("trusted", why=why, remedy="Compare at the same speed.")]
 
 

@@ -102,7 +102,7 @@ def _of_a_name(every: list[Keys], found: Mapping[str, Mapping[str, Any]], name: 
     raise input_error(
         name,
         f"names neither a key nor a {chooser}. In a study the word behind the dot is a name of your own; {chooser} decides which keys the table has",
-        f"{chooser} is one of {listed}{others}. 'stickslip keys {table}.{(alike or kinds)[0]}' lists the keys of one, 'stickslip keys {table}' those of all.",
+        f"{chooser} is one of {listed}{others}. 'stickslip keys {table}.{(alike or kinds)[0]}' lists the keys of one, 'stickslip keys {table}' all keys.",
     )
 
 

@@ -221,7 +221,7 @@ class Workshop:
             return ()
         return (
             (
-                f"part.{name}: its material replaces that of the file, and {', '.join(missing)}, left out, are those of steel. "
+                f"part.{name}: its material replaces the file's, and {', '.join(missing)}, left out, are taken from steel. "
                 "Give all constants."
             ),
         )

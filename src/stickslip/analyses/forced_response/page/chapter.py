@@ -152,10 +152,12 @@ VARY = "[vary] of a study file, stickslip.compare in Python"
 
 def _next(response: Response, best: ShownCase, *, idle: bool) -> list[str]:
     """Return the next step with its key: the remedy of a doubt, a wider sweep, more load, or further values."""
-    if response.trust(best):
-        return [f"Next: {remedy}" for remedy in _remedies(response, best)[:1]]
-    if not response.resonates(best):
-        return [f"Next: widen forced_response.{Curve(response.data, best.index).range_key}"]
+    remedies = _remedies(response, best) if response.trust(best) else []
+    if response.level(best) != "wrong" and not response.resonates(best):  # no other doubt matters without a resonance
+        wider = [remedy for remedy in remedies if remedy.startswith("widen ")]
+        remedies = wider or [f"widen forced_response.{Curve(response.data, best.index).range_key}"]
+    if response.trust(best) or remedies:
+        return [f"Next: {remedy}" for remedy in remedies[:1]]
     if idle:
         return ["Next: raise load.NAME.force_n, or press the contacts less, until they slip"]
     return _further(response, best)

@@ -230,7 +230,7 @@ def _of_dampers(physics: ModesInRange, moving: str = "", peak_hz: float = np.nan
     if not physics.damped:
         return
     if moving:
-        why = f"the damping by friction was not estimated: {moving}"
+        why = f"the damping by friction was not estimated, as {moving}"
         yield Verdict("trusted", why=why, remedy="stickslip check estimates it for steady normal forces.")
         return
     shown = physics.damped[:NAMED_MODES]

@@ -259,7 +259,7 @@ def contact_stiffness(case: Curve) -> Iterator[Finding]:
     if abs(SOFTER * case.read(StiffnessChange).stiffness_peak_slope) > DECIDED:
         yield Finding(
             "trusted",
-            f"the contact stiffness decides the peak: it changes {_softer(case)}",
+            f"the contact stiffness decides the peak, which changes {_softer(case)}",
             "Know it to a few per cent, from a measured stuck frequency for example, or vary it ([vary]).",
         )
 

@@ -179,7 +179,7 @@ def campbell_diagram(view: Waves[Campbell]) -> Plot:
     caption = (
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, {with_contacts('in the frame that turns with the wheel', view.found.contacts)}. "
-        f"Lines are labelled with wave and mode; those of several waves that coincide have one label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{f' Shaded: the {view.found.operating.name}.' * view.found.operating.known}{_not_shown(view, top)}"
+        f"Lines are labelled with wave and mode; lines that coincide share a label. Engine orders are thin and dashed. Circles mark where an order excites the nodal diameter of the mode ({found}).{f' Shaded: the {view.found.operating.name}.' * view.found.operating.known}{_not_shown(view, top)}"
     )
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 

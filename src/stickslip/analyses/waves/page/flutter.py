@@ -67,7 +67,7 @@ def least_stable_diagram(view: Waves[Flutter]) -> Plot:
         f"Aerodynamic damping over the inter-blade phase angle. The curve follows from the influence coefficients at any angle by "
         f"the energy method{f', {state}' if state else ''}; marks are the waves that the wheel has. Angles above zero are waves that run backward, against the "
         f"rotation. The least stable is {names[i]}, mode {m + 1}, with {number(float(total[i, m]), 4)} % of critical "
-        f"damping, that of the structure included. {fate}"
+        f"damping, structural damping included. {fate}"
     )
     return Plot(f"flutter{view.key}", "Least stable diagram", caption, figure)
 
