@@ -77,7 +77,7 @@ def test_frequencies_are_those_of_calculix_with_any_digits(tmp_path, digits, axi
 def test_a_tolerance_beyond_the_radius_moves_nodes_as_well(tmp_path):
     """It had no effect: nodes within the tolerance of the axis stay where they are."""
     ring(tmp_path / "ring.inp", 6, tolerance=500)
-    mesh = read_deck(tmp_path / "ring.inp").mesh
+    mesh = read_deck(tmp_path / "ring.inp", units=Units.mm_t_s()).mesh
     low, high = (mesh.points[mesh.node_sets[f"cyclic_{side}"]] for side in ("low", "high"))
     radius = [np.sort(np.hypot(side[:, 0], side[:, 1])) for side in (low, high)]
     np.testing.assert_allclose(*radius, rtol=1e-15)

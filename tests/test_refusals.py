@@ -372,7 +372,7 @@ def two_faces(axis: Axis | None) -> CyclicSector:
             lambda: rotating_solid(TETRAHEDRON, STEEL).at_speed(1.0, tangent="textbok"),
             "RotatingSolid.at_speed: there is no tangent 'textbok'. Did you mean 'textbook'?",
         ),
-        (lambda: Wanted(to=of_no_kind("pdf")), "export: to: is 'pdf'. Give one of vtu, frd, uff."),
+        (lambda: Wanted(to=of_no_kind("pdf")), "export: to: is 'pdf'. Give one of vtu, frd, uff, csv."),
         (lambda: Wanted(to="vtu", steps=0), "export: steps: is 0. Give 1 to 1000 instants."),
         (lambda: Wanted(to="vtu", steps=1001), "export: steps: is 1001. Give 1 to 1000 instants."),
         (lambda: rotating_beam(BEAM, 0, 0.0), "rotating_beam: elements: is 0. Give 1 or more."),
@@ -440,7 +440,7 @@ def two_faces(axis: Axis | None) -> CyclicSector:
             lambda: resonance_bounds(system(), LOAD, [], "most"),
             "resonance_bounds: known: holds no bounds that converged. Give those of `traction_bounds`.",
         ),
-        (lambda: first_peaks(of_no_kind(None), math.nan), "values: hold nan. Give finite numbers."),
+        (lambda: first_peaks(of_no_kind(None), math.nan), "values: are empty or hold nan. Give finite numbers."),
         (
             lambda: check_strategy(strategy()),
             "SimpleNamespace.threshold: is missing. Give it the indicator above which more harmonics are asked for",

@@ -190,7 +190,7 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
         If there is no peak in the range.
     """
     if not np.isfinite(value):
-        raise input_error("values", f"hold {value}", "Give finite numbers.")
+        raise input_error("values", f"are empty or hold {value}", "Give finite numbers.")
     problem = search.problem(value)
     points, motions = _swept(search, problem, value)
     heights = np.linalg.norm(motions, axis=1)
