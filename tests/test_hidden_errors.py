@@ -92,3 +92,18 @@ def test_nothing_is_told_that_only_the_removal_of_a_wrong_key_makes_wrong(
     lines = said(tmp_path, change)
     assert len(lines) == len({line.partition(": ")[0] for line in lines}) <= 2
     assert not any("'chain" in line or "no part" in line for line in lines)
+
+
+def test_the_name_of_the_study_file_is_no_name_of_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table that lacks a key was taken for what the message's own 'brake.toml: ' spoke of."""
+    text = TEXT.replace('law = "jenkins", ', "", 1).replace(NAME, 'on = "chain.m9"', 1)
+    (tmp_path / "brake.toml").write_text(text)
+    (tmp_path / "other.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    told = []
+    for name in ("brake.toml", "other.toml"):
+        with pytest.raises(InputError) as caught:
+            read_study(Path(name))
+        told.append([line.removeprefix(f"{name}: ") for line in str(caught.value).splitlines()])
+    assert told[0] == told[1]
+    assert len(told[0]) == 2

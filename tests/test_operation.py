@@ -205,12 +205,13 @@ def test_a_range_that_no_analysis_uses_is_told(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path)
     before, _, rest = path.read_text().partition("[forced_response]")
     text = before + "[nonlinear_mode]\nmodes = [1]\n\n" + rest[rest.index("\n[") :]
-    for extra, found in (("[operation]\noperating_hz = [10.0, 12.0]\n", 1), ("", 0)):
+    limit = "[stress]\nfatigue_limit_pa = 3e8\nultimate_pa = 9e8\n"
+    for extra, found in (("[operation]\noperating_hz = [10.0, 12.0]\n", 1), (limit, 1), ("", 0)):
         path.write_text(text + extra)
         study = read_study(path)
         told = not_used(study, asked_for(study))
         assert len(told) == found
-        assert all("[nonlinear_mode] does not use it. Ask for [forced_response] or [campbell]" in t for t in told)
+        assert all("[nonlinear_mode] does not use it. Ask for [forced_response]" in t for t in told)
 
 
 def test_the_amplitude_at_the_end_of_the_range_is_that_of_the_oscillator() -> None:

@@ -205,13 +205,15 @@ def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
 
 
 def not_used(study: Study, asked: Sequence[Analysis]) -> list[str]:
-    """Return a sentence on an operating range that no asked analysis holds its answers against."""
-    given = study.tables.operation.model_fields_set
-    if not given or any("operation" in one.shared for one in asked):
-        return []
-    using = " or ".join(f"[{name}]" for name in ANALYSES if "operation" in named(name).shared)
-    names = " and ".join(f"[{one.name}]" for one in asked)
-    return [f"[operation] changes nothing: {names} does not use it. Ask for {using}, or remove it."]
+    """Return a sentence on each shared table, operating range or stress, that no asked analysis uses."""
+    told = []
+    for table in ("operation", "stress"):
+        if not getattr(study.tables, table).model_fields_set or any(table in one.shared for one in asked):
+            continue
+        using = " or ".join(f"[{name}]" for name in ANALYSES if table in named(name).shared)
+        names = " and ".join(f"[{one.name}]" for one in asked)
+        told.append(f"[{table}] changes nothing: {names} does not use it. Ask for {using}, or remove it.")
+    return told
 
 
 def answer(asked: Analysis, cases: Sequence[Case], title: str = "", given: Mapping[str, Any] | None = None) -> Outcome:

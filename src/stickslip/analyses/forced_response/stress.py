@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from typing import Any
@@ -34,6 +34,7 @@ from stickslip.model.strength.cycle import CRITERIA, worst_utilisation
 from stickslip.model.strength.haigh import NO_YIELD
 from stickslip.response.forced.collected import Response
 from stickslip.response.forced.response import ForcedPoint
+from stickslip.response.stability.flow_map.contact_states import is_located
 from stickslip.study.exchange.chosen import FORCED, Chosen
 from stickslip.study.exchange.motion import expanded
 from stickslip.study.file.model.strength import Stress
@@ -42,6 +43,7 @@ WORST = 10  # places whose cycle is stored
 HAIGH_POINTS = 65  # of the line of a Haigh diagram
 KEPT = 1e-7  # of the largest stress: harmonics below are not stored
 MOST_SCALE = 1e6  # of the vibration, beyond which its allowed amplitude is not looked for
+SCALE_RTOL = 1e-5  # excess of the utilisation at the amplitude at the limit: waves are stored in single precision
 KINDS = STRESS_AT[1:]
 
 
@@ -79,6 +81,9 @@ class PeakStress:
     waves: ComplexArray  # (n, k, 6) Pa, single precision
     one_sided: int  # parts whose cyclic faces have the stress of one side, as their meshes do not match
     doubt: str  # why there is none
+    linear: bool = (
+        False  # whether all contacts are linear while they stick: then stress follows the load as long as they do
+    )
 
     @property
     def harmonics(self) -> ComplexArray:
@@ -105,7 +110,7 @@ def of_stress(question: Question, response: Response) -> Values:
     try:
         each = _of_parts(question, asked, top.point)
     except InputError as error:  # the response is solved: it stays
-        return _nothing(f"the stress at the peak was not computed: {error.problem}")
+        return _nothing(f"the stress at the peak was not computed: {str(error).rstrip('.')}")
     harmonics = np.concatenate([own.harmonics for own in each.values()], axis=1)
     alternating, mean = alternating_and_mean(harmonics)
     sizes = np.abs(harmonics).max(axis=(1, 2), initial=0.0)
@@ -129,6 +134,7 @@ def of_stress(question: Question, response: Response) -> Values:
         waves=harmonics[kept].astype(np.complex64),
         one_sided=sum(own.one_sided for own in each.values()),
         doubt="",
+        linear=all(map(is_located, question.model.system.interface.laws)),
     )
     return dict(vars(found))
 
@@ -181,7 +187,7 @@ def with_margin(table: Stress, note: Mapping[str, Any], amplitude: float, *, sli
     """
     stress = PeakStress(**note)
     found, scale = _judged(_Judging(table.model_dump_json(), stress.digest, table, stress))
-    more = SurfaceStress(**found, allowed_amplitude=scale * amplitude, stress_slips=int(slips))
+    more = SurfaceStress(**found, allowed_amplitude=scale * amplitude, stress_slips=int(slips or not stress.linear))
     return stored(more)
 
 
@@ -192,7 +198,7 @@ def _judged(asked: _Judging) -> tuple[dict[str, Any], float]:
     try:
         cards = _cards(table, stress)
     except InputError as error:
-        cards, stress = [], PeakStress(**_nothing(f"no margin was computed: {error.problem}"))
+        cards, stress = [], PeakStress(**_nothing(f"no margin was computed: {str(error).rstrip('.')}"))
     at = _codes(stress, table.apart_m)
     found = _margins(table, stress, cards, at == 0)
     order = _worst(found.utilisation, stress.alternating, at)
@@ -222,7 +228,7 @@ def _judged(asked: _Judging) -> tuple[dict[str, Any], float]:
         "haigh_mean": line[0],
         "haigh_amplitude": line[1],
     }
-    return values, _scale(table, stress, cards, found.utilisation, order)
+    return values, _scale(table, stress, cards, found.utilisation, at)
 
 
 def _cards(table: Stress, stress: PeakStress) -> list[tuple[IntArray, StrengthCard]]:
@@ -285,19 +291,44 @@ def _scale(
     stress: PeakStress,
     cards: list[tuple[IntArray, StrengthCard]],
     utilisation: FloatArray,
-    order: IntArray,
+    at: IntArray,
 ) -> float:
-    """Return the factor on the vibration, at a fixed static stress, at which one of the worst places reaches its limit.
+    """Return the factor on the vibration, at a fixed static stress, at which the first place reaches its limit.
 
     NaN without a margin, 0 where the static stress alone exceeds it. Of a line of the Haigh diagram without shakedown it is the inverse
-    of the largest utilisation. Else the utilisation rises with the factor.
+    of the largest utilisation. Else the utilisation rises with the factor, and other places may lead there: those that do join the worst
+    ones of today, until none exceeds its limit.
     """
-    if not order.size or np.isnan(utilisation[order[0]]):
+    places = _worst(utilisation, stress.alternating, at)
+    if not places.size or np.isnan(utilisation[places[0]]):
         return math.nan
     if table.criterion is None and table.above_yield == "void":
-        return 1.0 / float(utilisation[order[0]]) if utilisation[order[0]] > 0 else math.inf
+        return 1.0 / float(utilisation[places[0]]) if utilisation[places[0]] > 0 else math.inf
+    while True:
+        factor = _scale_of(table, stress, cards, places)
+        if factor == 0.0:
+            return factor
+        there = _scaled(stress, min(factor, MOST_SCALE))
+        found = _margins(table, there, cards, at == 0).utilisation
+        leading = _worst(found, there.alternating, at)
+        more = leading[~(found[leading] <= 1.0 + SCALE_RTOL)]
+        if np.isin(more, places).all():
+            return factor
+        places = np.union1d(places, more)
+
+
+def _scaled(stress: PeakStress, factor: float) -> PeakStress:
+    """Return the stress with all its vibration scaled."""
+    by = np.where(stress.orders > 0, factor, 1.0)[:, None, None]
+    return replace(stress, waves=stress.waves * by, alternating=factor * stress.alternating)
+
+
+def _scale_of(table: Stress, stress: PeakStress, cards: list[tuple[IntArray, StrengthCard]], places: IntArray) -> float:
+    """Return the factor on the vibration at which one of some places reaches its limit; infinite beyond `MOST_SCALE`."""
     each = [
-        (own, card.take(np.flatnonzero(np.isin(at, own)))) for at, card in cards if (own := at[np.isin(at, order)]).size
+        (own, card.take(np.flatnonzero(np.isin(at, own))))
+        for at, card in cards
+        if (own := at[np.isin(at, places)]).size
     ]
     waves = stress.harmonics
 

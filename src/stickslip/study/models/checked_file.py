@@ -20,7 +20,8 @@ from stickslip.study.own_code import OwnCode
 MAX_ROUNDS = 5  # of removing wrong keys and checking again
 VARY = "vary"
 MEANT = re.compile(r"Did you mean '([^']+)'")
-PATH = re.compile(r"\S*[/\\]\S*")  # a name of a file in a message
+# a name of a file in a message: with a folder, or with a usual ending
+PATH = re.compile(r"\S*[/\\]\S*|[\w.-]+\.(?:toml|inp|cdb|dat|csv|npz|op2|op4|vtu|vtk|frd|sti|mas|msh|py|bdf)\b")
 
 
 @dataclass

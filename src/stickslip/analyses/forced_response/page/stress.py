@@ -124,7 +124,11 @@ def _scaled(own: SurfaceStress) -> str:
     """Say at which amplitude the limit is reached."""
     if not np.isfinite(own.allowed_amplitude):
         return ""
-    how = "an estimate, as contacts slip or open" if own.stress_slips else "exact while contacts stick"
+    how = (
+        "an estimate, as contacts slip, open or are nonlinear springs"
+        if own.stress_slips
+        else "exact while contacts stick"
+    )
     return f" It reaches its limit at {quantity(float(own.allowed_amplitude), 'm')} of the report output, by scaling the vibration: {how}."
 
 

@@ -671,7 +671,9 @@ class SurfaceStress:
         along="case",
     )
     stress_slips: int = column(
-        "1", "1 if a contact slips or opens at the peak, so that scaling is an estimate", along="case"
+        "1",
+        "1 if a contact slips or opens at the peak or is a nonlinear spring, so that scaling is an estimate",
+        along="case",
     )
     stress_shakedown: int = column("1", "1 if the mean stress is bounded by shakedown", along="case")
     fatigue_limit: float = column("Pa", "amplitude endured at R = -1", along="case")

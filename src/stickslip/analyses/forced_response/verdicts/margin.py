@@ -142,7 +142,7 @@ def _allowed(own: SurfaceStress) -> tuple[str, str]:
     if own.stress_slips:
         return (
             why,
-            "Contacts slip or open at the peak: stress does not follow the load in proportion, so this is an estimate.",
+            "Contacts slip, open or are nonlinear springs at the peak: stress does not follow the load in proportion, so this is an estimate.",
         )
     return why, "All contacts stick: scaling is exact as long as they do."
 
