@@ -16,6 +16,7 @@ import xarray as xr
 from stickslip.errors import SingularError, input_error
 from stickslip.study.analysis import Analysis, Case, Notes, Solved, TextTable
 from stickslip.study.file.model.loads import Operation
+from stickslip.study.file.model.strength import Stress
 from stickslip.study.own_code import OwnCode
 from stickslip.study.store.netcdf import stacked, variable
 from stickslip.study.store.progress import LOG, advance
@@ -124,7 +125,7 @@ class ToyStudy:
     text: str = "[toy]"
     asked: tuple[str, ...] = ("toy",)
     measured: None = None
-    tables: Any = field(default_factory=lambda: SimpleNamespace(operation=Operation()))
+    tables: Any = field(default_factory=lambda: SimpleNamespace(operation=Operation(), stress=Stress()))
     code: OwnCode = field(default_factory=OwnCode)
     built: list[float] = field(default_factory=list)
 
