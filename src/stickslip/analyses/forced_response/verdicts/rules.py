@@ -477,7 +477,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("wrong", why, remedy, (point,))
         elif motion == "next to it":
             why = f"the motion in time ends on another motion {off:+.2g} % away, to which more harmonics do not lead"
-            remedy = "The table of checks compares both; --verify at this frequency alone integrates for longer."
+            remedy = "Believe the time integration; the table of checks compares both motions."
             yield Finding("doubtful", why, remedy, (point,))
         elif motion == "not settled":
             why = "a time integration did not settle to a periodic motion"
